@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What goes into a frame and what comes out of it, as plain data that can cross a process border."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..core.scene import Finding, Float32
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """Size, technique and quality of one frame.
+
+    technique_settings: values by name, checked against the technique's own settings dataclass. samples: jittered
+    pictures averaged per pixel (box filter of one pixel). shadow_samples: points per soft light that phase one
+    averages. buffers: also return every intermediate image.
+    """
+
+    width: int
+    height: int
+    technique: str = "vlm"
+    technique_settings: Mapping[str, Any] = field(default_factory=dict)
+    samples: int = 16
+    shadow_resolution: int = 1024
+    shadow_samples: int = 16
+    buffers: bool = False
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A finished picture.
+
+    images: float32 (h, w, c) linear Rec.709, row 0 at the top; always `combined` (RGBA, premultiplied), `direct` and
+    `indirect` (RGB radiance, W/(m² sr)). timings: (pass name, milliseconds) in order. counters: what was counted
+    (lights, triangles, samples …). device: name of the device; timer: how milliseconds were taken.
+    """
+
+    images: dict[str, Float32]
+    timings: list[tuple[str, float]]
+    counters: dict[str, float]
+    device: str
+    timer: str
+    findings: tuple[Finding, ...] = ()
