@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+import pytest
+
+from vlm_addon.core.errors import InvalidInput
+from vlm_addon.core.metrics import flip, mean_relative_error, point_error, relative_rmse
+
+REFERENCE = np.full((8, 8, 3), 0.5, np.float32)
+
+
+def test_a_uniform_excess_of_a_tenth_is_a_relative_rmse_of_a_tenth():
+    assert relative_rmse(1.1 * REFERENCE, REFERENCE) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_rmse_weighs_one_wrong_pixel_by_its_share():
+    image = REFERENCE.copy()
+    image[0, 0] = 1.0
+    assert relative_rmse(image, REFERENCE) == pytest.approx(np.sqrt(1 / 64), rel=1e-6)
+    assert mean_relative_error(image, REFERENCE) == pytest.approx(1 / 64, rel=1e-6)
+
+
+def test_pixels_outside_the_mask_do_not_count():
+    image, mask = REFERENCE.copy(), np.ones((8, 8), bool)
+    image[3, 3], mask[3, 3] = 99.0, False
+    assert relative_rmse(image, REFERENCE, mask) == 0.0
+
+
+def test_a_black_reference_is_not_a_division_by_zero():
+    black = np.zeros_like(REFERENCE)
+    assert relative_rmse(black, black) == 0.0
+    assert relative_rmse(REFERENCE, black) == np.inf
+
+
+def test_point_error_of_a_dim_point_is_measured_against_a_tenth_of_the_mean():
+    reference = np.array([0.0, 2.0])
+    assert point_error(np.array([0.1, 2.0]), reference) == pytest.approx([1.0, 0.0])
+
+
+def test_flip_is_zero_for_equal_and_large_for_opposite_pictures():
+    black, white = np.zeros((16, 16, 3), np.float32), np.ones((16, 16, 3), np.float32)
+    assert flip(white, white)[0] == 0.0
+    assert flip(black, white)[0] > 0.8
+
+
+def test_pictures_of_different_size_are_refused():
+    with pytest.raises(InvalidInput, match="render both alike"):
+        relative_rmse(REFERENCE, REFERENCE[:4])
