@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Structs shared by numpy and GLSL: the layout is stated once, the dtype and the GLSL text both follow from it.
+
+A shader gets a struct with `#include "gpu_layout/Name"`; Python fills an array of `STRUCT.dtype` and uploads its
+bytes. Offsets follow std430 (OpenGL 4.6 core, 7.6.2.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+# GLSL type: (numpy scalar, components, alignment in bytes)
+_STD430: Mapping[str, tuple[str, int, int]] = {
+    "float": ("<f4", 1, 4),
+    "int": ("<i4", 1, 4),
+    "uint": ("<u4", 1, 4),
+    "vec2": ("<f4", 2, 8),
+    "vec3": ("<f4", 3, 16),
+    "vec4": ("<f4", 4, 16),
+    "ivec2": ("<i4", 2, 8),
+    "ivec4": ("<i4", 4, 16),
+    "uvec4": ("<u4", 4, 16),
+    "mat4": ("<f4", 16, 16),
+}
+
+
+@dataclass(frozen=True)
+class GpuStruct:
+    """A GLSL struct. fields: (GLSL type, name) in order; `mat4` is a (16,) float32 column-major block."""
+
+    name: str
+    fields: tuple[tuple[str, str], ...]
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Structured dtype with the std430 offsets, itemsize rounded up to the largest alignment."""
+        formats: list[object] = []
+        offsets: list[int] = []
+        end, largest = 0, 4
+        for glsl_type, _ in self.fields:
+            scalar, components, alignment = _STD430[glsl_type]
+            offset = _round_up(end, alignment)
+            formats.append(scalar if components == 1 else (scalar, (components,)))
+            offsets.append(offset)
+            end = offset + 4 * components
+            largest = max(largest, alignment)
+        names = [name for _, name in self.fields]
+        itemsize = _round_up(end, largest)
+        return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": itemsize})
+
+    @property
+    def glsl(self) -> str:
+        """The struct as GLSL text."""
+        lines = [f"    {glsl_type} {name};" for glsl_type, name in self.fields]
+        return "\n".join([f"struct {self.name} {{", *lines, "};", ""])
+
+    def zeros(self, count: int) -> np.ndarray:
+        """(count,) zeros of `dtype`, ready to be filled and uploaded."""
+        return np.zeros(count, self.dtype)
+
+
+def _round_up(value: int, multiple: int) -> int:
+    return (value + multiple - 1) // multiple * multiple
+
+
+def matrix_block(matrix: np.ndarray) -> np.ndarray:
+    """(16,) float32, column-major as GLSL reads a mat4, of a (4, 4) matrix that maps column vectors."""
+    return np.asarray(matrix, np.float64).T.reshape(16).astype(np.float32)
+
+
+VIRTUAL_LIGHT = GpuStruct(
+    "VirtualLight",
+    (
+        ("vec3", "v0"),
+        ("int", "tag_id"),
+        ("vec3", "v1"),
+        ("float", "strength"),
+        ("vec3", "v2"),
+        ("float", "bounding_radius"),
+        ("vec3", "area_vector"),
+        ("float", "area"),
+    ),
+)
+"""One triangle of the light mesh: corners in metres from the local origin, vector area in m²."""
+
+STRUCTS: dict[str, GpuStruct] = {struct.name: struct for struct in (VIRTUAL_LIGHT,)}
+"""What `#include "gpu_layout/Name"` finds."""

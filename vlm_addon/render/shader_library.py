@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shader sources from `gpu_shaders/`: includes, constants from Python, and compile errors with file and line.
+
+A shader file has no `#version` line (the library puts it) and may contain `#include "lib/x.glsl"` (path from
+`gpu_shaders/`, included once) and `#include "gpu_layout/Name"` (a struct of `gpu_layout.STRUCTS`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from ..core.errors import ShaderError
+from . import gpu_layout
+
+if TYPE_CHECKING:
+    import moderngl
+
+SHADER_ROOT = Path(__file__).resolve().parents[2] / "gpu_shaders"
+GLSL_VERSION = 430
+LAYOUT_PREFIX = "gpu_layout/"
+
+_INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"\s*$')
+# "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (Intel, Apple, ANGLE)
+_LOCATION = re.compile(r"(?<![\w.])(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")
+
+Built = TypeVar("Built")
+Defines = Mapping[str, int | float | bool | str]
+
+
+class ShaderLibrary:
+    """Compiles the programs of one context and keeps each variant once."""
+
+    def __init__(self, context: moderngl.Context, root: Path = SHADER_ROOT) -> None:
+        self._context = context
+        self._root = root
+        self._compute: dict[tuple, moderngl.ComputeShader] = {}
+        self._programs: dict[tuple, moderngl.Program] = {}
+
+    def compute(self, path: str, defines: Defines | None = None) -> moderngl.ComputeShader:
+        """The compute shader of file `path`. Raises ShaderError."""
+        key = (path, _key(defines))
+        if key not in self._compute:
+            self._compute[key] = self.compute_from_text(f'#include "{path}"\n', path, defines)
+        return self._compute[key]
+
+    def compute_from_text(self, text: str, name: str, defines: Defines | None = None) -> moderngl.ComputeShader:
+        """A compute shader from text (with includes), not kept; `name` stands for the text in messages."""
+        source, files = self.expand(text, name, defines)
+        return self._build(lambda: self._context.compute_shader(source), [files])
+
+    def program(self, vertex: str, fragment: str | None, defines: Defines | None = None) -> moderngl.Program:
+        """The program of a vertex and a fragment shader file; fragment None for depth only. Raises ShaderError."""
+        key = (vertex, fragment, _key(defines))
+        if key not in self._programs:
+            vertex_source, vertex_files = self.expand(f'#include "{vertex}"\n', vertex, defines)
+            fragment_text = "void main() {}" if fragment is None else f'#include "{fragment}"\n'
+            fragment_source, fragment_files = self.expand(fragment_text, fragment or "no fragment shader", defines)
+            self._programs[key] = self._build(
+                lambda: self._context.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
+                [vertex_files, fragment_files],
+            )
+        return self._programs[key]
+
+    def expand(self, text: str, name: str, defines: Defines | None = None) -> tuple[str, list[str]]:
+        """Complete GLSL source of `text`, and the file names that its `#line` directives number."""
+        files = [name]
+        lines = [f"#version {GLSL_VERSION} core"]
+        lines += [f"#define {key} {_literal(value)}" for key, value in sorted((defines or {}).items())]
+        lines += ["#line 1 0", *self._expanded_lines(text, 0, files, set())]
+        return "\n".join(lines) + "\n", files
+
+    def _expanded_lines(self, text: str, file_index: int, files: list[str], included: set[str]) -> list[str]:
+        lines: list[str] = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            match = _INCLUDE.match(line)
+            if match is None:
+                lines.append(line)
+                continue
+            path = match.group(1)
+            if path in included:
+                lines.append("")
+                continue
+            included.add(path)
+            files.append(path)
+            index = len(files) - 1
+            body = self._read(path, f"{files[file_index]}:{number}")
+            lines += [f"#line 1 {index}", *self._expanded_lines(body, index, files, included)]
+            lines.append(f"#line {number + 1} {file_index}")
+        return lines
+
+    def _read(self, path: str, where: str) -> str:
+        if path.startswith(LAYOUT_PREFIX):
+            struct = gpu_layout.STRUCTS.get(path.removeprefix(LAYOUT_PREFIX))
+            if struct is None:
+                raise ShaderError(f"{where}: no struct {path!r}; known: {', '.join(sorted(gpu_layout.STRUCTS))}")
+            return struct.glsl
+        try:
+            return (self._root / path).read_text(encoding="utf-8")
+        except OSError:
+            raise ShaderError(f"{where}: shader file {path!r} is missing from {self._root.name}/") from None
+
+    def _build(self, make: Callable[[], Built], file_tables: list[list[str]]) -> Built:
+        import moderngl
+
+        try:
+            return make()
+        except moderngl.Error as error:
+            files = file_tables[0]
+            if len(file_tables) > 1 and "fragment_shader" in str(error):
+                files = file_tables[1]
+            raise ShaderError(named_locations(str(error), files)) from None
+
+
+def named_locations(message: str, files: list[str]) -> str:
+    """A driver's message with `source:line` written as `file:line`, on one line for each error."""
+
+    def name(match: re.Match[str]) -> str:
+        index, line = int(match.group(1)), match.group(2) or match.group(3)
+        return f"{files[index]}:{line}:" if index < len(files) else match.group(0)
+
+    lines = [line.strip() for line in message.splitlines()]
+    return "; ".join(_LOCATION.sub(name, line) for line in lines if line and not set(line) <= {"="})
+
+
+def _key(defines: Defines | None) -> tuple:
+    return tuple(sorted((defines or {}).items()))
+
+
+def _literal(value: int | float | bool | str) -> str:
+    if isinstance(value, bool):
+        return str(int(value))
+    return repr(float(value)) if isinstance(value, float) else str(value)
