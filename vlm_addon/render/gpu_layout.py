@@ -86,5 +86,55 @@ VIRTUAL_LIGHT = GpuStruct(
 )
 """One triangle of the light mesh: corners in metres from the local origin, vector area in m²."""
 
-STRUCTS: dict[str, GpuStruct] = {struct.name: struct for struct in (VIRTUAL_LIGHT,)}
+TRIANGLE = GpuStruct(
+    "Triangle",
+    (("vec3", "geometric_normal"), ("int", "material"), ("int", "tag_id"), ("int", "face_id")),
+)
+"""What is constant over one visible triangle; face_id counts the triangles of the snapshot in order."""
+
+MATERIAL = GpuStruct(
+    "Material",
+    (
+        ("vec3", "base_color"),
+        ("float", "alpha"),
+        ("vec3", "emission"),
+        ("float", "roughness"),
+        ("float", "metallic"),
+        ("float", "specular_ior_level"),
+        ("float", "ior"),
+        ("float", "normal_strength"),
+        ("uint", "flags"),
+        ("int", "alpha_channel"),
+        ("int", "roughness_channel"),
+        ("int", "metallic_channel"),
+    ),
+)
+"""core.scene.Material; flags: the MATERIAL_* bits of CONSTANTS."""
+
+STRUCTS: dict[str, GpuStruct] = {struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL)}
 """What `#include "gpu_layout/Name"` finds."""
+
+CONSTANTS: dict[str, int | float] = {
+    # storage buffer bindings
+    "TRIANGLE_BINDING": 0,
+    "MATERIAL_BINDING": 1,
+    "VIRTUAL_LIGHT_BINDING": 2,
+    "RADIOSITY_BINDING": 3,
+    "LAMP_BINDING": 4,
+    "SOURCE_SAMPLE_BINDING": 5,
+    "RESULT_BINDING": 6,
+    # texture units of a material
+    "BASE_COLOR_UNIT": 0,
+    "ALPHA_UNIT": 1,
+    "ROUGHNESS_UNIT": 2,
+    "METALLIC_UNIT": 3,
+    "EMISSION_UNIT": 4,
+    "NORMAL_UNIT": 5,
+    # bits of Material.flags; a texture's bit is 1 << its unit
+    "MATERIAL_PRINCIPLED": 1 << 8,
+    "MATERIAL_CORNER_COLOR": 1 << 9,
+    # models in the G-buffer's id image
+    "MODEL_DIFFUSE": 0,
+    "MODEL_PRINCIPLED": 1,
+}
+"""Numbers that Python and GLSL share; every shader sees them as `#define`s."""

@@ -68,7 +68,8 @@ class ShaderLibrary:
         """Complete GLSL source of `text`, and the file names that its `#line` directives number."""
         files = [name]
         lines = [f"#version {GLSL_VERSION} core"]
-        lines += [f"#define {key} {_literal(value)}" for key, value in sorted((defines or {}).items())]
+        constants: Defines = {**gpu_layout.CONSTANTS, **(defines or {})}
+        lines += [f"#define {key} {_literal(value)}" for key, value in sorted(constants.items())]
         lines += ["#line 1 0", *self._expanded_lines(text, 0, files, set())]
         return "\n".join(lines) + "\n", files
 
