@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Programs that print measured figures: `./dev bench NAME`."""
