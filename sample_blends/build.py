@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds the sample scenes from code.
+
+    python sample_blends/build.py all
+    python sample_blends/build.py monkey_box --mesh bunny.obj --out /elsewhere
+    python sample_blends/build.py city --percent 25 --out /elsewhere
+
+Needs the bpy module. The committed files are saved by the oldest supported Blender, so that every later one opens them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+COMMITTED = ("cornell_box", "empty_room")
+ON_DEMAND: tuple[str, ...] = ()
+HERE = Path(__file__).resolve().parent
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """The command line; ends the process with exit code 2 on bad usage."""
+    parser = argparse.ArgumentParser(description="Build the sample scenes.", epilog=__doc__.split("\n\n")[1])
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    names = (*COMMITTED, *ON_DEMAND)
+    parser.add_argument("names", nargs="+", metavar="NAME", choices=[*names, "all"], help=", ".join([*names, "all"]))
+    parser.add_argument("--out", type=Path, default=HERE, metavar="DIR", help="folder to write to (default: this one)")
+    return parser.parse_args(arguments)
+
+
+def build(name: str, folder: Path) -> Path:
+    """Builds one scene and returns the file written."""
+    from scenes import blend
+
+    importlib.import_module(f"scenes.{name}").build()
+    path = folder / f"{name}.blend"
+    blend.save(str(path))
+    return path
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Builds what is asked for; `all` means the committed scenes."""
+    options = parse(arguments)
+    names = COMMITTED if "all" in options.names else options.names
+    options.out.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        path = build(name, options.out)
+        print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
