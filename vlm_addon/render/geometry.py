@@ -69,6 +69,11 @@ class GpuGeometry:
         self._vertex_arrays: dict[int, moderngl.VertexArray] = {}
 
     @property
+    def variants(self) -> dict[str, bool]:
+        """Preprocessor names for the attributes that are not always there, and whether they are."""
+        return {"HAS_CORNER_COLORS": "in_color" in self._buffers, "HAS_TANGENTS": "in_tangent" in self._buffers}
+
+    @property
     def has_alpha(self) -> bool:
         """Whether some triangles may let light through."""
         return self.opaque_count < self.triangle_count

@@ -130,6 +130,14 @@ CONSTANTS: dict[str, int | float] = {
     "METALLIC_UNIT": 3,
     "EMISSION_UNIT": 4,
     "NORMAL_UNIT": 5,
+    # texture units of the G-buffer
+    "GBUFFER_POSITION_UNIT": 0,
+    "GBUFFER_SHADING_NORMAL_UNIT": 1,
+    "GBUFFER_GEOMETRIC_NORMAL_UNIT": 2,
+    "GBUFFER_BASE_COLOR_UNIT": 3,
+    "GBUFFER_EMISSION_UNIT": 4,
+    "GBUFFER_IDS_UNIT": 5,
+    "FIRST_FREE_UNIT": 6,
     # bits of Material.flags; a texture's bit is 1 << its unit
     "MATERIAL_PRINCIPLED": 1 << 8,
     "MATERIAL_CORNER_COLOR": 1 << 9,

@@ -10,7 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from ..core.errors import ShaderError
 from . import gpu_layout
@@ -113,6 +115,21 @@ class ShaderLibrary:
             if len(file_tables) > 1 and "fragment_shader" in str(error):
                 files = file_tables[1]
             raise ShaderError(named_locations(str(error), files)) from None
+
+
+def set_uniforms(program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, Any]) -> None:
+    """Sets uniforms by name: numbers, booleans, vectors, and (4, 4) matrices that map column vectors.
+
+    A name that the program has not, because a variant does not use it, is left out.
+    """
+    members: Any = program
+    for name, value in values.items():
+        if name not in members:
+            continue
+        if np.ndim(value) == 2:
+            members[name].write(gpu_layout.matrix_block(value).tobytes())
+        else:
+            members[name].value = tuple(value) if np.ndim(value) else value
 
 
 def named_locations(message: str, files: list[str]) -> str:

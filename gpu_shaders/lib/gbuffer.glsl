@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The surface of a pixel, as the G-buffer pass packs it: this file and passes/gbuffer.frag know how.
+#ifndef LIB_GBUFFER
+#define LIB_GBUFFER
+
+struct Surface {
+    vec3 position;          // m, from the local origin
+    float depth;            // m along the direction of view
+    vec3 shading_normal;    // unit, on the viewer's side
+    vec3 geometric_normal;  // unit, on the viewer's side
+    vec3 base_color;        // linear Rec.709
+    vec3 emission;          // radiance, W/(m² sr)
+    float roughness;
+    float metallic;
+    float specular_ior_level;
+    float ior;
+    int material;
+    int tag_id;
+    int face_id;
+    int model;              // MODEL_DIFFUSE or MODEL_PRINCIPLED
+};
+
+// Whether a pixel shows geometry: cleared normals are zero. Elsewhere the ids are undefined.
+bool shows_geometry(vec3 geometric_normal) {
+    return dot(geometric_normal, geometric_normal) > 0.25;
+}
+
+Surface unpack_surface(
+    vec4 position, vec4 shading_normal, vec4 geometric_normal, vec4 base_color, vec4 emission, ivec4 ids
+) {
+    return Surface(
+        position.xyz, position.w, shading_normal.xyz, geometric_normal.xyz, base_color.rgb, emission.rgb,
+        shading_normal.w, geometric_normal.w, base_color.w, emission.w, ids.x, ids.y, ids.z, ids.w
+    );
+}
+#endif
