@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated scene as F12 would see it, handed to a function.
+
+Blender gives a depsgraph of render mode (render-level modifiers, particles and visibility) to render engines only,
+so an engine that renders nothing is registered for the time of one call. Nothing of the scene's data is edited
+for it, and animated or driven visibility comes out right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from types import TracebackType
+from typing import Any, TypeVar
+
+import bpy
+
+from ..core.errors import VlmError
+from .temporary import restored
+
+T = TypeVar("T")
+
+ENGINE_ID = "VLM_SNAPSHOT"
+RENDER_HANDLERS = ("render_init", "render_pre", "render_post", "render_complete", "render_cancel", "render_stats")
+
+
+class _KeptError:
+    """Keeps an exception that Blender would print and drop at the border of an engine callback."""
+
+    def __init__(self) -> None:
+        self.error: BaseException | None = None
+
+    def __enter__(self) -> _KeptError:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> bool:
+        self.error = error
+        return True
+
+
+def with_render_depsgraph(scene: Any, view_layer: Any, function: Callable[[Any], T]) -> T:
+    """What `function` returns for the depsgraph of render mode of `view_layer` at the scene's current frame.
+
+    Every setting changed for it is as before afterwards, also when `function` raises; its exception passes through.
+    Raises VlmError where Blender cannot evaluate, for instance during another render.
+    """
+    if bpy.app.is_job_running("RENDER"):
+        raise VlmError(f"scene {scene.name!r}: Blender is rendering; wait for the render to end and try again")
+    results: list[T] = []
+    kept = _KeptError()
+
+    class SnapshotEngine(bpy.types.RenderEngine):
+        bl_idname = ENGINE_ID
+        bl_label = "Snapshot"
+
+        def render(self, depsgraph: Any) -> None:
+            with kept:
+                results.append(function(depsgraph))
+
+    with ExitStack() as stack:
+        stack.enter_context(_only_layer(scene, view_layer))
+        stack.enter_context(_some_camera(scene))
+        stack.enter_context(_no_handlers())
+        stack.enter_context(_own_render_slot())
+        bpy.utils.register_class(SnapshotEngine)
+        stack.callback(bpy.utils.unregister_class, SnapshotEngine)
+        stack.enter_context(
+            restored(
+                scene.render,
+                engine=ENGINE_ID,
+                resolution_x=4,
+                resolution_y=4,
+                use_border=False,
+                use_compositing=False,
+                use_sequencer=False,
+                use_multiview=False,
+                use_single_layer=False,
+            )
+        )
+        bpy.ops.render.render(scene=scene.name)
+    if kept.error is not None:
+        raise kept.error
+    if not results:
+        raise VlmError(f"scene {scene.name!r}: Blender did not evaluate it for rendering")
+    return results[0]
+
+
+@contextmanager
+def _only_layer(scene: Any, view_layer: Any) -> Iterator[None]:
+    """Render `view_layer` and no other."""
+    with ExitStack() as stack:
+        for layer in scene.view_layers:
+            stack.enter_context(restored(layer, use=layer.name == view_layer.name))
+        yield
+
+
+@contextmanager
+def _some_camera(scene: Any) -> Iterator[None]:
+    """Blender renders nothing, not even for an engine without pictures, unless the scene has a camera."""
+    if scene.camera is not None:
+        yield
+        return
+    data = bpy.data.cameras.new("vlm temporary")
+    camera = bpy.data.objects.new("vlm temporary", data)
+    scene.camera = camera
+    try:
+        yield
+    finally:
+        scene.camera = None
+        bpy.data.objects.remove(camera)
+        bpy.data.cameras.remove(data)
+
+
+@contextmanager
+def _no_handlers() -> Iterator[None]:
+    """Scripts that wait for a render are not called: none happens."""
+    kept = {name: list(getattr(bpy.app.handlers, name)) for name in RENDER_HANDLERS}
+    for name in kept:
+        getattr(bpy.app.handlers, name).clear()
+    try:
+        yield
+    finally:
+        for name, handlers in kept.items():
+            getattr(bpy.app.handlers, name)[:] = handlers
+
+
+@contextmanager
+def _own_render_slot() -> Iterator[None]:
+    """The picture of the last render stays in its slot."""
+    result = bpy.data.images.get("Render Result")
+    if result is None or not len(result.render_slots):
+        yield
+        return
+    with restored(result.render_slots, active_index=len(result.render_slots) - 1):
+        yield

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What one frame of the open scene shows, as a SceneSnapshot: the way from Blender's data to ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import bpy
+import numpy as np
+
+from ..core.errors import InvalidInput
+from ..core.scene import Camera, Float64, Light, Mesh, SceneSnapshot
+from .color_space import working_to_rec709
+from .evaluation import with_render_depsgraph
+from .lamps import read_camera, read_light
+from .materials import FindingList, MaterialTable
+from .mesh_extraction import SURFACE_TYPES, MeshExtractor
+from .names import is_light_mesh
+from .world import read_world
+
+T = TypeVar("T")
+
+IGNORED_TYPES = ("ARMATURE", "EMPTY", "LATTICE", "SPEAKER", "CAMERA", "LIGHT_PROBE")
+"""Object types that no renderer draws."""
+
+
+@dataclass(frozen=True)
+class ExtractOptions:
+    """What to extract.
+
+    viewport_levels: modifiers as in the viewport instead of as in a render. objects: names of objects; where given,
+    only they and what is instanced by them are extracted as surfaces.
+
+    """
+
+    viewport_levels: bool = False
+    objects: frozenset[str] | None = None
+
+
+def extract_scene(options: ExtractOptions | None = None, depsgraph: Any = None) -> SceneSnapshot:
+    """The current scene, view layer and frame as a snapshot.
+
+    depsgraph: an evaluated depsgraph to read as it is (a render engine's); without one the scene is evaluated as for
+    a render. Raises InvalidInput for a visible mesh that cannot be rendered: no faces, a vertex that is not finite,
+    a scale of zero.
+    """
+    options = options or ExtractOptions()
+    return _evaluated(options, depsgraph, lambda graph: _Extraction(graph, options).snapshot())
+
+
+def _evaluated(options: ExtractOptions, depsgraph: Any, function: Callable[[Any], T]) -> T:
+    if depsgraph is not None:
+        return function(depsgraph)
+    if options.viewport_levels:
+        return function(bpy.context.evaluated_depsgraph_get())
+    return with_render_depsgraph(bpy.context.scene, bpy.context.view_layer, function)
+
+
+def require_camera(snapshot: SceneSnapshot) -> Camera:
+    """The camera of the snapshot. Raises InvalidInput where there is none."""
+    if snapshot.camera is None:
+        problem = "it has no perspective or orthographic camera"
+        raise InvalidInput(f"scene {snapshot.name!r}", problem, "add one (Add > Camera) or name one by --camera")
+    return snapshot.camera
+
+
+def require_lights(snapshot: SceneSnapshot) -> tuple[Light, ...]:
+    """The lamps of the snapshot. Raises InvalidInput where there is neither a lamp nor an emissive surface."""
+    if not snapshot.lights and not any(mesh.emission.any() for mesh in snapshot.meshes):
+        problem = "nothing in it sends out light"
+        raise InvalidInput(f"scene {snapshot.name!r}", problem, "add a light (Add > Light) or an emissive material")
+    return snapshot.lights
+
+
+def require_surfaces(snapshot: SceneSnapshot) -> tuple[Mesh, ...]:
+    """The visible meshes of the snapshot. Raises InvalidInput where there are none."""
+    if not snapshot.triangle_count:
+        problem = "no visible object in it has a surface"
+        raise InvalidInput(f"scene {snapshot.name!r}", problem, "add a mesh or enable one in renders")
+    return snapshot.meshes
+
+
+class _Extraction:
+    """One walk over a depsgraph."""
+
+    def __init__(self, depsgraph: Any, options: ExtractOptions) -> None:
+        self._depsgraph = depsgraph
+        self._options = options
+        self._report = FindingList()
+        self._to_rec709 = working_to_rec709()
+        self._materials = MaterialTable(self._to_rec709, self._report)
+        self._meshes = MeshExtractor(self._materials, self._to_rec709, self._report, depsgraph)
+
+    def snapshot(self) -> SceneSnapshot:
+        meshes: list[Mesh] = []
+        lights: list[Light] = []
+        scene = self._depsgraph.scene
+        for instance in self._depsgraph.object_instances:
+            self._visit(instance, meshes, lights)
+        world = read_world(scene.world, self._materials.evaluator, self._report)
+        camera = self._camera(scene)
+        return SceneSnapshot(
+            name=scene.name,
+            meshes=tuple(meshes),
+            materials=tuple(self._materials.materials),
+            textures=tuple(self._materials.textures),
+            lights=tuple(lights),
+            camera=camera,
+            world_radiance=world,
+            frame=scene.frame_current,
+            findings=self._report.findings,
+        )
+
+    def _visit(self, instance: Any, meshes: list[Mesh], lights: list[Light]) -> None:
+        blender_object = instance.object
+        if not instance.show_self or is_light_mesh(blender_object) or self._hidden(instance):
+            return
+        if blender_object.type == "LIGHT":
+            light = read_light(
+                blender_object,
+                _matrix(instance),
+                instance_name(instance),
+                self._materials.evaluator,
+                self._to_rec709,
+                self._report,
+            )
+            if light is not None:
+                lights.append(light)
+        elif blender_object.type in SURFACE_TYPES:
+            if self._chosen(instance):
+                meshes += self._meshes.meshes(instance, instance_name(instance), _matrix(instance))
+        elif blender_object.type not in IGNORED_TYPES:
+            subject = f"object {blender_object.name!r}"
+            self._report(subject, f"objects of type {blender_object.type} are not simulated", "it is left out")
+
+    def _hidden(self, instance: Any) -> bool:
+        """Whether F12 would not show it; a depsgraph of render mode holds only what it shows."""
+        owner = instance.parent if instance.is_instance else instance.object
+        return self._depsgraph.mode != "RENDER" and owner is not None and owner.hide_render
+
+    def _chosen(self, instance: Any) -> bool:
+        chosen = self._options.objects
+        if chosen is None:
+            return True
+        owner = instance.parent if instance.is_instance else instance.object
+        return owner is not None and owner.name in chosen
+
+    def _camera(self, scene: Any) -> Camera | None:
+        original = scene.camera.original if scene.camera is not None else None
+        if original is None:
+            return None
+        evaluated = original.evaluated_get(self._depsgraph)
+        return read_camera(evaluated, np.array(evaluated.matrix_world, np.float64), scene, self._report)
+
+
+def _matrix(instance: Any) -> Float64:
+    """(4, 4) float64 world matrix."""
+    return np.array(instance.matrix_world, np.float64)
+
+
+def instance_name(instance: Any) -> str:
+    """Name of the object, or of instancer and object with the instance's own id."""
+    if not instance.is_instance or instance.parent is None:
+        return str(instance.object.name)
+    numbers = [str(number) for number in instance.persistent_id if number != 2**31 - 1]
+    return f"{instance.parent.name}/{instance.object.name}/{'.'.join(reversed(numbers))}"

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names under which a virtual light mesh is stored in a .blend (the table in docs/architecture.md)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+COLLECTION = "Virtual Light Meshes"
+
+SCHEMA_VERSION = 1
+SCHEMA_PROPERTY = "vlm_schema"
+STRENGTH_PROPERTY = "vlm_strength"
+HUE_PROPERTY = "vlm_hue"
+DYNAMIC_PROPERTY = "vlm_dynamic"
+
+COLOR_ATTRIBUTE = "vlm_color"
+EMISSION_ATTRIBUTE = "vlm_emission"
+TAG_ATTRIBUTE = "vlm_tag"
+AREA_SCALE_ATTRIBUTE = "vlm_area_scale"
+
+TAG_PROPERTY = "vlm_tag"
+
+
+def is_light_mesh(blender_object: Any) -> bool:
+    """Whether an object (original or evaluated) is a virtual light mesh."""
+    return SCHEMA_PROPERTY in blender_object
