@@ -74,6 +74,26 @@ def test_random_triangles_against_fifty_digits(distance: float) -> None:
         assert one(point, normal, triangle) == pytest.approx(exact(point, normal, triangle), rel=RELATIVE, abs=absolute)
 
 
+@pytest.mark.parametrize("distance", [2.0, 12.0, 60.0, 1e3])
+@pytest.mark.parametrize("above", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1)])
+def test_triangle_cut_by_the_horizon_against_fifty_digits(distance: float, above: tuple[int, ...]) -> None:
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.25, 0.125], [0.25, 0.5, -0.75]])
+    area_vector = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    centroid = triangle.mean(axis=0)
+    # A normal with given heights of the three corners over the point: solve for it, the point placed to fit.
+    heights = np.where(np.array(above, bool), 0.3, -0.2) + np.array([0.0, 0.02, -0.03])
+    gradient = np.linalg.lstsq(triangle[1:] - triangle[0], heights[1:] - heights[0], rcond=None)[0]
+    normal = gradient + unit(area_vector) * np.sqrt(max(0.0, 1.0 - gradient @ gradient))
+    normal = unit(normal)
+    rise = (triangle - centroid) @ normal
+    level = -0.5 * (rise[np.array(above, bool)].min() + rise[~np.array(above, bool)].max())
+    along = unit(np.cross(normal, np.cross(area_vector, normal)))
+    point = centroid + distance * along - level * normal
+    expected = exact(point, normal, triangle)
+    assert expected > 0.0
+    assert one(point, normal, triangle) == pytest.approx(expected, rel=1e-11)
+
+
 def octagon(flatten: float) -> np.ndarray:
     """A convex octagon in the plane z = 0 whose coordinates are exact."""
     x = np.array([2, 1, -1, -2, -2, -1, 1, 2]) / 2.0

@@ -118,15 +118,13 @@ def _summed_edges(offsets: Float64, heights: Float64, normals: Float64) -> Float
 def _clipped_outline(offsets: Float64, heights: Float64) -> tuple[Float64, Float64]:
     """Outline above the horizon as a closed chain of 2 k vertices (m, 2 k, 3), some repeated, and their heights."""
     starts, stops, start_heights, stop_heights = _clipped_ends(offsets, heights)
-    above = (heights > 0.0) | (np.roll(heights, -1, axis=1) > 0.0)
+    next_heights = np.roll(heights, -1, axis=1)
+    hidden = (heights <= 0.0) & (next_heights <= 0.0)
+    # A convex outline dips below the horizon once: its hidden edges collapse onto the point where it does.
+    exit_point = np.where(((heights > 0.0) & (next_heights <= 0.0))[..., None], stops, 0.0).sum(axis=1)[:, None]
+    starts, stops = (np.where(hidden[..., None], exit_point, ends) for ends in (starts, stops))
     chain = np.stack([starts, stops], axis=2).reshape(len(offsets), 2 * offsets.shape[1], 3)
-    chain_heights = np.stack([start_heights, stop_heights], axis=2).reshape(len(offsets), 2 * offsets.shape[1])
-    # Hidden edges collapse onto one vertex that is part of the outline.
-    first = np.argmax(np.repeat(above, 2, axis=1), axis=1)
-    anchor = np.take_along_axis(chain, first[:, None, None], axis=1)
-    anchor_height = np.take_along_axis(chain_heights, first[:, None], axis=1)
-    keep = np.repeat(above, 2, axis=1)
-    return np.where(keep[..., None], chain, anchor), np.where(keep, chain_heights, anchor_height)
+    return chain, np.stack([start_heights, stop_heights], axis=2).reshape(chain.shape[:2])
 
 
 def _integrated(outline: Float64, heights: Float64, area_vectors: Float64, order: int) -> Float64:
