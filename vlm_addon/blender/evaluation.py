@@ -58,9 +58,9 @@ def with_render_depsgraph(scene: Any, view_layer: Any, function: Callable[[Any],
                 results.append(function(depsgraph))
 
     with ExitStack() as stack:
-        stack.enter_context(_only_layer(scene, view_layer))
+        stack.enter_context(only_layer(scene, view_layer))
         stack.enter_context(_some_camera(scene))
-        stack.enter_context(_no_handlers())
+        stack.enter_context(no_render_handlers())
         stack.enter_context(_own_render_slot())
         bpy.utils.register_class(SnapshotEngine)
         stack.callback(bpy.utils.unregister_class, SnapshotEngine)
@@ -86,7 +86,7 @@ def with_render_depsgraph(scene: Any, view_layer: Any, function: Callable[[Any],
 
 
 @contextmanager
-def _only_layer(scene: Any, view_layer: Any) -> Iterator[None]:
+def only_layer(scene: Any, view_layer: Any) -> Iterator[None]:
     """Render `view_layer` and no other."""
     with ExitStack() as stack:
         for layer in scene.view_layers:
@@ -112,7 +112,7 @@ def _some_camera(scene: Any) -> Iterator[None]:
 
 
 @contextmanager
-def _no_handlers() -> Iterator[None]:
+def no_render_handlers() -> Iterator[None]:
     """Scripts that wait for a render are not called: none happens."""
     kept = {name: list(getattr(bpy.app.handlers, name)) for name in RENDER_HANDLERS}
     for name in kept:
