@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first, rough part of a large reduction, by fast_simplification; edge_collapse.py does the fine part.
+
+fast_simplification is some fifty times as fast as array operations can be, but it looks at neither borders between
+materials nor topology. So it gets one material group at a time (all borders locked), is stopped far above the final
+count, and where its result is not the manifold it was given, the triangles around the fault are kept out of a second
+run. Its collapses are replayed here instead of by its own replay function, which also drops isolated points one by
+one in a Python loop: a vertex goes where its chain of collapses ends.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh_topology import Bool, Int64, closed_shells, cut_to_manifold, half_edges, sum_by
+from .scene import Float64
+
+ATTEMPTS = 4
+# Triangles from which a group is worth a run of its own, the least a run is asked to leave, and the share of a group
+# that a run must remove to be worth it.
+LARGE_GROUP = 1000
+LEAST_BUDGET = 8
+WORTHWHILE = 0.7
+# fast_simplification keeps the mesh in variables of its module.
+_one_at_a_time = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """positions: (v, 3), moved but not renumbered. triangles: (n, 3) in old vertex numbers. source_triangle: (n,) the
+    input triangle that each continues. vertex_map: (v,) the vertex each was merged into."""
+
+    positions: Float64
+    triangles: Int64
+    source_triangle: Int64
+    vertex_map: Int64
+
+
+def reduce_groups(positions: Float64, triangles: Int64, group: Int64, weight: Float64, target: int) -> Reduced:
+    """About `target` triangles, or more, shared among the groups by weight, with the lines between groups in place.
+
+    positions: (v, 3). triangles: (t, 3), an oriented manifold with border. group: (t,). weight: (t,) non-negative.
+    """
+    apart, origin = _cut_between_groups(triangles, group, len(positions))
+    points = positions[origin]
+    kept = np.ones(len(triangles), bool)
+    vertex_map = np.arange(len(points))
+    for members, budget in _shares(group, weight, target):
+        part = reduce_roughly(points, apart[members], budget)
+        kept[members] = False
+        kept[members[part.source_triangle]] = True
+        changed = np.unique(apart[members])
+        points[changed], vertex_map[changed] = part.positions[changed], part.vertex_map[changed]
+    moved = positions.copy()
+    moved[origin] = points
+    whole_map = np.arange(len(positions))
+    whole_map[origin] = origin[vertex_map]
+    source_triangle = np.flatnonzero(kept)
+    return Reduced(moved, whole_map[triangles[source_triangle]], source_triangle, whole_map)
+
+
+def _cut_between_groups(triangles: Int64, group: Int64, vertex_count: int) -> tuple[Int64, Int64]:
+    """Triangles whose vertices on lines between groups are doubled, and the vertex each one was.
+
+    Both copies of a doubled vertex lie on a border and are never moved, so they can be put together again.
+    """
+    key = np.repeat(group, 3) * np.int64(vertex_count) + triangles.ravel()
+    unique, cut = np.unique(key, return_inverse=True)
+    return cut.reshape(-1, 3), unique % vertex_count
+
+
+def _shares(group: Int64, weight: Float64, target: int) -> list[tuple[Int64, int]]:
+    """(triangles, budget) of each run: large groups alone, small ones together, those below their budget not."""
+    size = np.bincount(group)
+    budget = target * sum_by(group, weight, len(size)) / max(float(weight.sum()), float(np.finfo(float).tiny))
+    reducible = (size > 0) & (budget < WORTHWHILE * size)
+    large = reducible & (size >= LARGE_GROUP)
+    order = np.argsort(group, kind="stable")
+    ends = np.cumsum(size)
+    runs = [(order[ends[g] - size[g] : ends[g]], max(int(budget[g]), LEAST_BUDGET)) for g in np.flatnonzero(large)]
+    small = reducible & ~large
+    if small.any():
+        runs.append((np.flatnonzero(small[group]), max(int(budget[small].sum()), LEAST_BUDGET)))
+    return runs
+
+
+def reduce_roughly(positions: Float64, triangles: Int64, target: int) -> Reduced:
+    """About `target` triangles, or more, with every border vertex in place, no edge opened and no shell lost.
+
+    positions: (v, 3). triangles: (t, 3) use some of them. After ATTEMPTS faulty results the input is returned.
+    """
+    frozen = np.zeros(len(triangles), bool)
+    shell, _ = closed_shells(triangles, len(positions))
+    for _ in range(ATTEMPTS):
+        loose = ~frozen
+        budget = target - int(frozen.sum())
+        if budget <= 0 or budget >= loose.sum():
+            break
+        reduced = _run(positions, triangles, loose, budget)
+        fault = _faults(reduced, triangles, positions)[reduced.vertex_map[triangles]].any(axis=1)
+        lost = np.bincount(shell[reduced.source_triangle], minlength=int(shell.max()) + 1) == 0
+        fault |= lost[shell]
+        if not fault.any():
+            return reduced
+        frozen |= fault
+    return Reduced(positions, triangles, np.arange(len(triangles)), np.arange(len(positions)))
+
+
+def _run(positions: Float64, triangles: Int64, loose: Bool, budget: int) -> Reduced:
+    used, local = np.unique(triangles[loose], return_inverse=True)
+    local = local.reshape(-1, 3)
+    points, collapses = _simplify(positions[used], local, budget)
+    merged = np.arange(len(used))
+    merged[collapses[:, 1]] = collapses[:, 0]
+    while not np.array_equal(merged, merged[merged]):
+        merged = merged[merged]
+    vertex_map = np.arange(len(positions))
+    vertex_map[used] = used[merged]
+    mapped = vertex_map[triangles]
+    a, b, c = mapped.T
+    keep = np.flatnonzero((a != b) & (b != c) & (c != a))
+    moved = positions.copy()
+    # The library numbers the vertices of its result in the order of those that still have a triangle.
+    left = np.unique(merged[local][_distinct(merged[local])])
+    moved[used[left]] = points
+    return Reduced(moved, mapped[keep], keep, vertex_map)
+
+
+def _distinct(triangles: Int64) -> Bool:
+    a, b, c = triangles.T
+    return (a != b) & (b != c) & (c != a)
+
+
+def _simplify(points: Float64, triangles: Int64, budget: int) -> tuple[Float64, Int64]:
+    import fast_simplification
+
+    # Its error threshold grows from 2e-6 in units of length squared: with the mean edge at one, from small errors on.
+    edges = points[triangles] - points[np.roll(triangles, -1, axis=1)]
+    scale = max(float(np.linalg.norm(edges, axis=2).mean()), float(np.finfo(float).tiny))
+    centre = points.mean(axis=0)
+    with _one_at_a_time:
+        result, _, collapses = fast_simplification.simplify(
+            (points - centre) / scale,
+            triangles.astype(np.int32),
+            target_count=budget,
+            return_collapses=True,
+            preserve_border=True,
+        )
+    return result * scale + centre, np.asarray(collapses, np.int64).reshape(-1, 2)
+
+
+def _faults(reduced: Reduced, triangles: Int64, positions: Float64) -> Bool:
+    """(v,): vertices where the result has another topology than a manifold with the old border, or is not finite."""
+    count = len(positions)
+    fault = np.zeros(count, bool)
+    fault |= ~np.isfinite(reduced.positions).all(axis=1)
+    border = np.zeros(count, bool)
+    before = half_edges(triangles, count)
+    border[triangles.ravel()[before.twin < 0]] = True
+    after = half_edges(reduced.triangles, count)
+    start, end = reduced.triangles.ravel(), np.roll(reduced.triangles, -1, axis=1).ravel()
+    opened = (after.twin < 0) & ~(border[start] & border[end])
+    opened |= after.face_count[after.edge] > 2
+    fault[start[opened]] = fault[end[opened]] = True
+    return fault | (_fans(reduced.triangles, count) > np.maximum(_fans(triangles, count), 1))
+
+
+def _fans(triangles: Int64, vertex_count: int) -> Int64:
+    """(v,): pieces into which the triangles around each vertex fall."""
+    return np.bincount(cut_to_manifold(triangles, vertex_count)[1], minlength=vertex_count)

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Virtual lights are pushed behind the surface that they stand for (seed 002, section 3.4, figures 3.5 and 3.7).
+
+Each light asks for its plane to be moved back until no point of its region lies behind it. A vertex belongs to
+several lights, so it goes to the nearest point that lies behind all of its moved planes; moving shared vertices keeps
+closed shells closed. No vertex goes further than a share of the thickness of the body there: both sides of a thin
+shell can move without passing each other. What then still stands in front needs tags (section 3.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh_topology import Bool, Int64, Rows, vertex_faces
+from .scene import Float64
+from .triangle_tree import build_tree
+
+FirstHits = Callable[[Float64, Float64, bool], Float64]
+
+ROUNDS = 3
+SWEEPS = 16
+# Of the thickness, for one side; below one half, so that two sides that move towards each other do not meet.
+THICKNESS_SHARE = 0.4
+# Of the size (square root of the area) of the smallest light around a vertex.
+LARGEST_STEP = 0.5
+# A float32 coordinate relative to the middle of the lights is off by up to 2^-25 of the half diagonal, and a height
+# n.(v - p) sums three products of two such coordinates: about 8 such errors. 32 of them leave a margin of four, so
+# a wall is exactly dark to itself in the shaders, yet moves by only a millionth of the scene.
+INSET_SHARE = 2.0**-20
+# The inset of a light small against the scene, as a share of the light's size.
+LARGEST_INSET = 1e-3
+# Source triangles that face further away than this from their light do not push it: it would never clear them.
+STEEPEST_COSINE = 0.2
+LEAST_TURN_COSINE = 0.2
+LEAST_AREA_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class Placement:
+    """positions: (v, 3) float64, m. limited: (n,) bool, lights that the thickness kept from moving far enough.
+    depth: (n,) m, how far each light still stands in front of its region."""
+
+    positions: Float64
+    limited: Bool
+    depth: Float64
+
+
+def place_behind(positions: Float64, triangles: Int64, regions: Rows, source_corners: Float64) -> Placement:
+    """`positions` moved so that the plane of each light lies behind its region as far as the body is thick enough.
+
+    positions: (v, 3). triangles: (n, 3). regions: source triangles of each light. source_corners: (t, 3, 3), m. No
+    triangle turns over or loses more than 1 - LEAST_AREA_SHARE of its area.
+    """
+    if not len(triangles):
+        return Placement(positions, np.zeros(0, bool), np.zeros(0))
+    facing = _facing_regions(positions[triangles], regions, source_corners)
+    inset = insets(positions[triangles])
+    around = vertex_faces(triangles, len(positions))
+    tree = build_tree(positions[triangles])
+    longest = LARGEST_STEP * _smallest_around(np.sqrt(_normals(positions[triangles])[1]), around)
+    moved = np.zeros_like(positions)
+    stopped = np.zeros(len(positions), bool)
+    for _ in range(ROUNDS):
+        corners = (positions + moved)[triangles]
+        wanted = intrusions(corners, facing, source_corners) + inset
+        moved = moved + _behind_planes(_normals(corners)[0], wanted, around)
+        moved = _shortened(moved, longest)
+        moved, hit = _within_thickness(positions, moved, tree.first_hits)
+        stopped |= hit
+        moved = _without_flips(positions, moved, triangles)
+    depth = intrusions((positions + moved)[triangles], facing, source_corners)
+    limited = stopped[triangles].any(axis=1) & (depth > 0)
+    return Placement(positions + moved, limited, np.maximum(depth, 0.0))
+
+
+def insets(corners: Float64) -> Float64:
+    """(n,) m: how far each light is set behind a surface that it lies in exactly."""
+    points = corners.reshape(-1, 3)
+    half_diagonal = 0.5 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    return np.minimum(INSET_SHARE * half_diagonal, LARGEST_INSET * np.sqrt(_normals(corners)[1]))
+
+
+def intrusions(corners: Float64, regions: Rows, source_corners: Float64) -> Float64:
+    """(n,) m: how far each light's plane stands in front of the deepest corner of its region.
+
+    Negative where the plane lies behind the whole region; -inf for a light without one.
+    """
+    normals, _ = _normals(corners)
+    owner = np.repeat(np.arange(len(corners)), regions.lengths)
+    offset = source_corners[regions.values] - corners[owner, :1]
+    height = np.einsum("ikj,ij->ik", offset, normals[owner]).min(axis=1)
+    deepest = np.full(len(corners), np.inf)
+    filled = regions.lengths > 0
+    deepest[filled] = np.minimum.reduceat(height, regions.starts[:-1][filled])
+    return -deepest
+
+
+def share_in_front(corners: Float64, regions: Rows, source_corners: Float64) -> float:
+    """Share of the source surface, by area, that lies behind the plane of its own light by more than rounding.
+
+    Judged at the corners and the middle of every source triangle.
+    """
+    normals, _ = _normals(corners)
+    owner = np.repeat(np.arange(len(corners)), regions.lengths)
+    points = source_corners[regions.values]
+    points = np.concatenate([points, points.mean(axis=1, keepdims=True)], axis=1)
+    height = np.einsum("ikj,ij->ik", points - corners[owner, :1], normals[owner])
+    weight = _normals(source_corners[regions.values])[1]
+    behind = (height < -0.5 * insets(corners)[owner, None]).mean(axis=1)
+    return float(behind @ weight / max(weight.sum(), np.finfo(float).tiny)) if len(weight) else 0.0
+
+
+def _normals(corners: Float64) -> tuple[Float64, Float64]:
+    """(unit normals (n, 3), 0 where degenerate, areas (n,))."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    return normal / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
+
+
+def _facing_regions(corners: Float64, regions: Rows, source_corners: Float64) -> Rows:
+    owner = np.repeat(np.arange(len(corners)), regions.lengths)
+    cosine = np.einsum("ij,ij->i", _normals(source_corners[regions.values])[0], _normals(corners)[0][owner])
+    keep = cosine > STEEPEST_COSINE
+    starts = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(corners)))])
+    return Rows(regions.values[keep], starts)
+
+
+def _smallest_around(values: Float64, around: Rows) -> Float64:
+    least = np.full(len(around.starts) - 1, 0.0)
+    filled = around.lengths > 0
+    least[filled] = np.minimum.reduceat(values[around.values], around.starts[:-1][filled])
+    return least
+
+
+def _behind_planes(normals: Float64, wanted: Float64, around: Rows) -> Float64:
+    """(v, 3): the short way of each vertex to behind the planes of its lights, each moved back by `wanted`.
+
+    Projection onto each half-space in turn, SWEEPS times: exact at once where the normals agree or are at right
+    angles, and close to the nearest such point elsewhere.
+    """
+    step = np.zeros((len(around.starts) - 1, 3))
+    valence = around.lengths
+    for _ in range(SWEEPS):
+        for slot in range(int(valence.max(initial=0))):
+            vertex = np.flatnonzero(valence > slot)
+            light = around.values[around.starts[vertex] + slot]
+            excess = np.einsum("ij,ij->i", normals[light], step[vertex]) + wanted[light]
+            step[vertex] -= np.maximum(excess, 0.0)[:, None] * normals[light]
+    return step
+
+
+def _shortened(moved: Float64, longest: Float64) -> Float64:
+    length = np.linalg.norm(moved, axis=1)
+    return moved * np.minimum(1.0, longest / np.where(length > 0, length, 1.0))[:, None]
+
+
+def _within_thickness(positions: Float64, moved: Float64, first_hits: FirstHits) -> tuple[Float64, Bool]:
+    """Moves cut to THICKNESS_SHARE of the way to where they would leave the body, and which were cut."""
+    active = np.flatnonzero(np.einsum("ij,ij->i", moved, moved) > 0)
+    reach = moved[active] / THICKNESS_SHARE
+    # A short way inside, so that the triangles around the vertex itself are not met.
+    start = positions[active] + 0.01 * reach
+    fraction = first_hits(start, positions[active] + reach, True)
+    cut = fraction < 1.0
+    moved = moved.copy()
+    moved[active[cut]] *= (0.01 + 0.99 * fraction[cut])[:, None]
+    stopped = np.zeros(len(positions), bool)
+    stopped[active[cut]] = True
+    return moved, stopped
+
+
+def _without_flips(positions: Float64, moved: Float64, triangles: Int64) -> Float64:
+    """Moves of the vertices of every triangle that would turn over or nearly vanish, halved until none does."""
+    before, area_before = _normals(positions[triangles])
+    moved = moved.copy()
+    halvings = 0
+    while True:
+        after, area_after = _normals((positions + moved)[triangles])
+        turned = np.einsum("ij,ij->i", before, after) < LEAST_TURN_COSINE
+        bad = (turned | (area_after < LEAST_AREA_SHARE * area_before)) & (area_before > 0)
+        bad &= (moved[triangles] != 0).any(axis=(1, 2))
+        if not bad.any():
+            return moved
+        moved[np.unique(triangles[bad])] *= 0.5 if halvings < 6 else 0.0
+        halvings += 1

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The source surface with at most so many triangles: which shells get any, then the rough and the fine reduction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bulk_reduction import Reduced, reduce_groups
+from .edge_collapse import CollapsedMesh, collapse_edges
+from .mesh_topology import Bool, Int64
+from .scene import Float64
+from .source_surface import SourceSurface
+
+# Triangles left by the rough reduction for each light asked for: from 8 on the result no longer gets better.
+ROUGH_FACTOR = 8
+# Share of the budget that the least forms of all shells may take before the weakest shells are left out.
+SHELL_SHARE = 0.75
+LEAST_CLOSED, LEAST_OPEN = 4, 1
+# Triangles below this share of the squared diagonal have no direction to shine in.
+LEAST_AREA = 1e-18
+
+
+@dataclass(frozen=True)
+class ReducedSurface:
+    """positions: (v, 3) float64, m. triangles: (n, 3) int64. source_triangle: (n,) the triangle of the surface that
+    each continues. vertex_map: (vertices of the surface,) the vertex each was merged into, -1 where its shell was
+    left out. merged_borders: whether the budget was too small to keep all borders between groups."""
+
+    positions: Float64
+    triangles: Int64
+    source_triangle: Int64
+    vertex_map: Int64
+    merged_borders: bool
+
+
+def reduce_surface(surface: SourceSurface, target: int) -> ReducedSurface:
+    """At most `target` triangles; all with area where the surface has no more than that."""
+    solid = surface.areas > LEAST_AREA * surface.diagonal**2
+    if int(solid.sum()) <= target:
+        return _selected(surface, solid)
+    rows = np.flatnonzero(_strongest_shells(surface, solid, target))
+    weight = surface.importance() / np.where(surface.areas > 0, surface.areas, 1.0)
+    start = Reduced(surface.positions, surface.triangles[rows], np.arange(len(rows)), np.arange(len(surface.positions)))
+    if len(rows) > 2 * ROUGH_FACTOR * target:
+        power = (weight * surface.areas)[rows]
+        start = reduce_groups(
+            surface.positions, surface.triangles[rows], surface.group[rows], power, ROUGH_FACTOR * target
+        )
+    left = rows[start.source_triangle]
+    used, triangles = np.unique(start.triangles, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    centre, size = surface.positions[used].mean(axis=0), surface.diagonal
+    positions = (start.positions[used] - centre) / size
+    power = weight[left] * _areas(positions, triangles)
+    collapsed = collapse_edges(positions, triangles, surface.group[left], power, target)
+    collapsed = _within_budget(collapsed, surface, left, target)
+    number = np.full(len(surface.positions), -1, np.int64)
+    number[used] = np.arange(len(used))
+    taken_part = np.zeros(len(surface.positions), bool)
+    taken_part[surface.triangles[rows]] = True
+    merged = np.where(taken_part, number[start.vertex_map], -1)
+    return ReducedSurface(
+        positions=collapsed.positions * size + centre,
+        triangles=collapsed.triangles,
+        source_triangle=left[collapsed.source_triangle],
+        vertex_map=np.where(merged >= 0, collapsed.vertex_map[merged], -1),
+        merged_borders=collapsed.merged_borders,
+    )
+
+
+def _selected(surface: SourceSurface, chosen: Bool) -> ReducedSurface:
+    rows = np.flatnonzero(chosen)
+    used, triangles = np.unique(surface.triangles[rows], return_inverse=True)
+    number = np.full(len(surface.positions), -1, np.int64)
+    number[used] = np.arange(len(used))
+    return ReducedSurface(surface.positions[used], triangles.reshape(-1, 3), rows, number, False)
+
+
+def _strongest_shells(surface: SourceSurface, solid: Bool, target: int) -> Bool:
+    """(t,): triangles of the strongest shells whose least forms together fit their share of the budget."""
+    count = len(surface.closed)
+    power = np.bincount(surface.shell, weights=surface.importance(), minlength=count)
+    size = np.bincount(surface.shell[solid], minlength=count)
+    least = np.minimum(size, np.where(surface.closed, LEAST_CLOSED, LEAST_OPEN))
+    order = np.argsort(np.where(size > 0, -power, np.inf), kind="stable")
+    fits = np.cumsum(least[order]) <= max(SHELL_SHARE * target, least[order[0]])
+    kept = np.zeros(count, bool)
+    kept[order[fits]] = True
+    return (kept & (size > 0))[surface.shell]
+
+
+def _within_budget(collapsed: CollapsedMesh, surface: SourceSurface, left: Int64, target: int) -> CollapsedMesh:
+    """Without triangles that have no area and, where still more than `target` are left, without the weakest shells."""
+    shell = surface.shell[left[collapsed.source_triangle]]
+    solid = _areas(collapsed.positions, collapsed.triangles) > LEAST_AREA
+    power = np.bincount(surface.shell, weights=surface.importance())
+    size = np.bincount(shell[solid], minlength=len(power))
+    order = np.argsort(-power, kind="stable")
+    kept = np.zeros(len(power), bool)
+    kept[order[np.cumsum(size[order]) <= max(target, size[order[0]])]] = True
+    keep = solid & kept[shell]
+    if keep.all():
+        return collapsed
+    used, triangles = np.unique(collapsed.triangles[keep], return_inverse=True)
+    number = np.full(len(collapsed.positions), -1, np.int64)
+    number[used] = np.arange(len(used))
+    return CollapsedMesh(
+        positions=collapsed.positions[used],
+        triangles=triangles.reshape(-1, 3),
+        source_triangle=collapsed.source_triangle[keep],
+        vertex_map=np.where(collapsed.vertex_map >= 0, number[collapsed.vertex_map], -1),
+        merged_borders=collapsed.merged_borders,
+    )
+
+
+def _areas(positions: Float64, triangles: Int64) -> Float64:
+    a, b, c = np.moveaxis(positions[triangles], 1, 0)
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)

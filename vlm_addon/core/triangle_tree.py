@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bounding volume hierarchy over triangles, walked by many queries at once with array operations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh_topology import Int64
+from .scene import Float64
+
+LEAF_SIZE = 4
+BITS_PER_AXIS = 20
+
+
+@dataclass(frozen=True)
+class TriangleTree:
+    """A complete binary tree over triangles in Morton order.
+
+    order: (slots,) int64, triangle of each slot of the leaves, -1 for padding. lower, upper: one (nodes, 3) array per
+    level, root first.
+    """
+
+    corners: Float64
+    order: Int64
+    lower: tuple[Float64, ...]
+    upper: tuple[Float64, ...]
+
+    def first_hits(self, origins: Float64, ends: Float64, from_behind: bool = False) -> Float64:
+        """(r,) fraction in (0, 1] of the way from origin to end at which each segment first meets a triangle, else inf.
+
+        origins, ends: (r, 3). from_behind: count only triangles whose front faces away from the origin. Starting
+        points that lie on a triangle do not count as hits.
+        """
+        return _first_hits(self, origins, ends, from_behind)
+
+
+def build_tree(corners: Float64) -> TriangleTree:
+    """The tree of (t, 3, 3) triangles."""
+    count = len(corners)
+    levels = max(0, int(np.ceil(np.log2(max(count, 1) / LEAF_SIZE)))) if count > LEAF_SIZE else 0
+    order = np.full(LEAF_SIZE << levels, -1, np.int64)
+    order[:count] = np.argsort(morton_codes(corners.mean(axis=1)), kind="stable")
+    filled = order >= 0
+    low = np.full((len(order), 3), np.inf)
+    high = np.full((len(order), 3), -np.inf)
+    low[filled], high[filled] = corners[order[:count]].min(axis=1), corners[order[:count]].max(axis=1)
+    lower, upper = [low.reshape(-1, LEAF_SIZE, 3).min(axis=1)], [high.reshape(-1, LEAF_SIZE, 3).max(axis=1)]
+    for _ in range(levels):
+        lower.insert(0, lower[0].reshape(-1, 2, 3).min(axis=1))
+        upper.insert(0, upper[0].reshape(-1, 2, 3).max(axis=1))
+    return TriangleTree(corners, order, tuple(lower), tuple(upper))
+
+
+def morton_codes(points: Float64) -> Int64:
+    """(n,) int64: position along the Z-order curve through the points' bounding cube; near codes are near in space."""
+    if not len(points):
+        return np.zeros(0, np.int64)
+    low = points.min(axis=0)
+    extent = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
+    cells = np.minimum((points - low) / extent * (1 << BITS_PER_AXIS), (1 << BITS_PER_AXIS) - 1).astype(np.int64)
+    code = np.zeros(len(points), np.int64)
+    for axis in range(3):
+        code |= _spread_bits(cells[:, axis]) << (2 - axis)
+    return code
+
+
+def _spread_bits(value: Int64) -> Int64:
+    """Each of the lower 21 bits moved to every third place."""
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        value = (value | (value << shift)) & mask
+    return value
+
+
+def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> Float64:
+    low, high = np.minimum(origins, ends), np.maximum(origins, ends)
+    segment = np.arange(len(origins))
+    node = np.zeros(len(origins), np.int64)
+    for level, (node_low, node_high) in enumerate(zip(tree.lower, tree.upper, strict=True)):
+        if level:
+            segment, node = np.repeat(segment, 2), np.repeat(2 * node, 2)
+            node[1::2] += 1
+        overlap = (low[segment] <= node_high[node]).all(axis=1) & (high[segment] >= node_low[node]).all(axis=1)
+        segment, node = segment[overlap], node[overlap]
+    triangle = tree.order.reshape(-1, LEAF_SIZE)[node]
+    segment = np.repeat(segment, LEAF_SIZE)[triangle.ravel() >= 0]
+    triangle = triangle[triangle >= 0]
+    fraction = _intersections(tree.corners[triangle], origins[segment], ends[segment], from_behind)
+    nearest = np.full(len(origins), np.inf)
+    np.minimum.at(nearest, segment, fraction)
+    return nearest
+
+
+def _intersections(corners: Float64, origin: Float64, end: Float64, from_behind: bool) -> Float64:
+    """Fraction along each segment where it meets its triangle, else inf (Moeller and Trumbore 1997)."""
+    direction = end - origin
+    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    p = np.cross(direction, ac)
+    determinant = np.einsum("ij,ij->i", ab, p)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / determinant
+        t = origin - corners[:, 0]
+        u = np.einsum("ij,ij->i", t, p) * inverse
+        q = np.cross(t, ab)
+        v = np.einsum("ij,ij->i", direction, q) * inverse
+        fraction = np.einsum("ij,ij->i", ac, q) * inverse
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (fraction > HIT_START) & (fraction <= 1)
+    if from_behind:
+        # determinant = -direction . (ab x ac): negative where the segment leaves through the back of the front.
+        hit &= determinant < 0
+    return np.where(hit, fraction, np.inf)
+
+
+# A segment that starts on a triangle meets it at 0 up to rounding.
+HIT_START = 1e-6
