@@ -52,7 +52,7 @@ def test_direct_light_is_that_of_blenders_watts(sphere):
 
 
 def test_pictures_have_the_top_row_first(make_plane, make_material, make_camera):
-    material, shader = make_material("glow", "ShaderNodeEmission")
+    material, _ = make_material("glow", "ShaderNodeEmission")
     plane = make_plane(size=10.0, material=material)
     plane.location = (0.0, 5.0, 0.0)
     make_camera()

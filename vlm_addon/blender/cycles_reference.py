@@ -53,8 +53,8 @@ class Reference:
     """A path-traced picture.
 
     images: float32 (h, w, 3) linear Rec.709, row 0 at the top: `combined`; `direct` and `indirect`, the diffuse light
-    times the diffuse colour; `diffuse_color`; `glossy_direct`, times the glossy colour; `emission`. noise: relative RMSE of `combined`, `direct` and `indirect` that is
-    left in them, from two halves of the samples.
+    times the diffuse colour; `diffuse_color`; `glossy_direct`, times the glossy colour; `emission`. noise: relative
+    RMSE of `combined`, `direct` and `indirect` that is left in them, from two halves of the samples.
     """
 
     images: dict[str, Float32]

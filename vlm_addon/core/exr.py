@@ -10,6 +10,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ LONG_NAMES = 0x400
 LINES_PER_BLOCK = {0: 1, 2: 1, 3: 16}
 """Scan lines of one block by compression: none, ZIP of one line, ZIP of sixteen."""
 ZIP = 3
-PIXEL_TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+PIXEL_TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 FLOAT = 2
 
 
@@ -119,7 +120,7 @@ def _decode(data: bytes, name: str) -> dict[str, Float32]:
 
 
 def _fill(
-    images: dict[str, Float32], channels: list[tuple[str, np.dtype]], raw: bytes, first: int, rows: int, width: int
+    images: dict[str, Float32], channels: list[tuple[str, np.dtype[Any]]], raw: bytes, first: int, rows: int, width: int
 ) -> None:
     position = 0
     for row in range(first, first + rows):
@@ -139,7 +140,7 @@ def _attributes(data: bytes, offset: int) -> tuple[dict[str, bytes], int]:
     return attributes, offset + 1
 
 
-def _channels(packed: bytes) -> Iterator[tuple[str, np.dtype]]:
+def _channels(packed: bytes) -> Iterator[tuple[str, np.dtype[Any]]]:
     offset = 0
     while packed[offset]:
         name, offset = _text(packed, offset)
