@@ -35,8 +35,22 @@ def polygon_form_factor(points: npt.ArrayLike, normals: npt.ArrayLike, polygons:
     rows = max(1, _PAIRS_PER_BLOCK // max(1, len(polygons)))
     for start in range(0, len(points), rows):
         block = slice(start, start + rows)
-        result[block] = _form_factors(points[block], normals[block], polygons)
+        count = len(points[block])
+        repeated_points = np.repeat(points[block], len(polygons), axis=0)
+        repeated_normals = np.repeat(normals[block], len(polygons), axis=0)
+        tiled = np.tile(polygons, (count, 1, 1))
+        result[block] = _paired(repeated_points, repeated_normals, tiled).reshape(count, len(polygons))
     return result
+
+
+def paired_form_factor(points: npt.ArrayLike, normals: npt.ArrayLike, polygons: npt.ArrayLike) -> Float64:
+    """(p,) float64: `polygon_form_factor` of point i and polygon i alone; polygons: (p, k, 3)."""
+    points, normals, polygons = (np.asarray(a, np.float64) for a in (points, normals, polygons))
+    _require_valid(points, normals, polygons)
+    if len(points) != len(polygons):
+        problem = f"{len(points)} points for {len(polygons)} polygons"
+        raise InvalidInput("form factor pairs", problem, "give one polygon per point")
+    return _paired(points, normals, polygons)
 
 
 def _require_valid(points: Float64, normals: Float64, polygons: Float64) -> None:
@@ -51,30 +65,25 @@ def _require_valid(points: Float64, normals: Float64, polygons: Float64) -> None
         raise InvalidInput("form factor polygons", f"shape {polygons.shape}", remedy)
 
 
-def _form_factors(points: Float64, normals: Float64, polygons: Float64) -> Float64:
-    """(p, q) form factors of all pairs at once."""
-    edges = polygons - polygons[:, :1]
-    area_vectors = 0.5 * np.cross(edges[:, 1:-1], edges[:, 2:]).sum(axis=1)
-    # Distances from the polygon's nearest vertex round least when the point touches the polygon.
-    offsets = polygons[None] - points[:, None, None]
-    squared = (offsets * offsets).sum(-1)
-    nearest = np.take_along_axis(offsets, squared.argmin(-1)[..., None, None], axis=2)[..., 0, :]
-    in_front = (nearest * area_vectors).sum(-1) < 0.0
-    heights = np.einsum("pqkc,pc->pqk", offsets, normals)
-    visible = in_front & (heights > 0.0).any(-1)
+def _paired(points: Float64, normals: Float64, polygons: Float64) -> Float64:
+    """(m,) form factors of m pairs."""
+    spans = polygons - polygons[:, :1]
+    area_vectors = 0.5 * np.cross(spans[:, 1:-1], spans[:, 2:]).sum(axis=1)
+    offsets = polygons - points[:, None]
+    # The height over the plane rounds least from the nearest vertex when the point touches the polygon.
+    nearest = np.take_along_axis(offsets, (offsets**2).sum(-1).argmin(-1)[:, None, None], axis=1)[:, 0]
+    heights = np.einsum("mkc,mc->mk", offsets, normals)
+    remaining = ((nearest * area_vectors).sum(-1) < 0.0) & (heights > 0.0).any(-1)
     centroids = polygons.mean(axis=1)
     radii = np.sqrt(((polygons - centroids[:, None]) ** 2).sum(-1).max(-1))
-    distances = np.linalg.norm(centroids[None] - points[:, None], axis=-1)
-    result = np.zeros(visible.shape)
-    remaining = visible.copy()
+    distances = np.linalg.norm(centroids - points, axis=-1)
+    result = np.zeros(len(points))
     for least_distance, order in _QUADRATURE:
-        pairs = remaining & (distances > least_distance * radii)
-        row, column = np.nonzero(pairs)
-        outline, outline_heights = _clipped_outline(offsets[pairs], heights[pairs])
-        result[pairs] = _integrated(outline, outline_heights, area_vectors[column], order)
-        remaining &= ~pairs
-    row, _ = np.nonzero(remaining)
-    result[remaining] = _summed_edges(offsets[remaining], heights[remaining], normals[row])
+        far = remaining & (distances > least_distance * radii)
+        outline, outline_heights = _clipped_outline(offsets[far], heights[far])
+        result[far] = _integrated(outline, outline_heights, area_vectors[far], order)
+        remaining &= ~far
+    result[remaining] = _summed_edges(offsets[remaining], heights[remaining], normals[remaining])
     return np.clip(result, 0.0, 1.0)
 
 
