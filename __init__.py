@@ -12,7 +12,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Take out all that `register` added and end the renderer's process."""
-    from . import operators
     from .vlm_addon.blender import registration
 
-    registration.unregister(operators.operator_classes())
+    registration.unregister()

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Look for what is wrong with the scene's virtual light meshes."""
+
+from bpy.types import Operator
+
+from ..vlm_addon.blender import authoring, availability
+from ..vlm_addon.core.errors import VlmError
+
+
+class VLM_OT_check(Operator):  # noqa: N801 (Blender's naming of classes)
+    """Look for what is wrong with the virtual light meshes; the findings are listed in the sidebar"""
+
+    bl_idname = "vlm.check"
+    bl_label = "Check"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
+
+    @classmethod
+    def poll(cls, context):
+        return authoring.allow(cls, availability.check_problem(context))
+
+    def execute(self, context):
+        try:
+            findings = authoring.check(context)
+        except VlmError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for finding in findings:
+            self.report({"WARNING"}, str(finding))
+        self.report({"INFO"}, f"{len(findings)} findings")
+        return {"FINISHED"}

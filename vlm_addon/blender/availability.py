@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What this machine and this scene lack, as sentences that say what to do."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Iterable, Iterator
+
+import bpy
+
+from .names import is_light_mesh
+
+AUTHORING_MODULES = ("fast_simplification", "trimesh")
+RENDERING_MODULES = ("moderngl", "glcontext")
+REINSTALL = "reinstall the extension from the zip made for this system and restart Blender"
+
+GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD"}
+
+
+def authoring_problem() -> str | None:
+    """Why light meshes cannot be created here, or None."""
+    return _missing(AUTHORING_MODULES)
+
+
+def rendering_problem() -> str | None:
+    """Why pictures cannot be rendered here, or None."""
+    if sys.platform == "darwin":
+        return "macOS stops at OpenGL 4.1: create, check and bake here, render on Linux or Windows"
+    if not sys.executable:
+        return "Blender's Python was not found, so the renderer cannot start: use an official build of Blender"
+    return _missing(RENDERING_MODULES)
+
+
+def _missing(modules: Iterable[str]) -> str | None:
+    # find_spec does not load the module: on Windows a loaded .pyd cannot be replaced at an update
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    return f"Missing {', '.join(missing)}: {REINSTALL}" if missing else None
+
+
+def light_mesh_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The virtual light meshes of `scene`, in order of name."""
+    return sorted((thing for thing in scene.objects if is_light_mesh(thing)), key=lambda thing: thing.name)
+
+
+def has_geometry(thing: bpy.types.Object) -> bool:
+    """Whether the object may show surfaces, its own or those of a collection that it instances."""
+    shows = thing.type in GEOMETRY_TYPES or thing.is_instancer
+    return shows and not is_light_mesh(thing)
+
+
+def selection_problem(context: bpy.types.Context) -> str | None:
+    """Why the selection gives no light mesh, or None."""
+    if not any(has_geometry(thing) for thing in context.selected_objects):
+        return "Nothing to make lights from: select the objects that should bounce light"
+    return authoring_problem()
+
+
+def visible_scene_problem(context: bpy.types.Context) -> str | None:
+    """Why the visible scene gives no light mesh, or None."""
+    if not any(has_geometry(thing) for thing in _rendered(context)):
+        return "The scene shows no surfaces: add a mesh (Add > Mesh) or enable an object for rendering"
+    return authoring_problem()
+
+
+def check_problem(context: bpy.types.Context) -> str | None:
+    """Why there is nothing to check, or None."""
+    if not light_mesh_objects(context.scene):
+        return "The scene has no virtual light mesh: create one first"
+    return None
+
+
+def light_scene_problem(context: bpy.types.Context) -> str | None:
+    """Why the scene cannot be lit and rendered, or None."""
+    if context.scene.camera is None:
+        return "The scene has no camera: add one (Add > Camera) and aim it (View > Align View > Align Active Camera)"
+    return rendering_problem() or visible_scene_problem(context)
+
+
+def _rendered(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+    return (thing for thing in context.view_layer.objects if not thing.hide_render)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine: F12 and background renders by the renderer's process."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..core.errors import Cancelled, VlmError
+from ..core.scene import Finding
+from ..render.frame_types import Frame, RenderSettings
+from .availability import light_mesh_objects, rendering_problem
+from .color_space import convert, rec709_to_working
+from .extract import extract_scene
+from .light_mesh_io import extract_light_mesh
+from .render_process import KEPT
+
+ENGINE_ID = "VLM_ENGINE"
+DIRECT_TECHNIQUE = "direct"
+EXTRA_PASSES = {"direct": "Direct Light", "indirect": "Indirect Light"}
+VIEW_MESSAGE = "Virtual Light Mesh renders by F12 (Render > Render Image); use Material Preview to look around"
+MESSAGE_MARGIN = 24
+MESSAGE_HEIGHT = 80
+MESSAGE_SIZE = 14
+
+
+class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming of classes)
+    """Direct light from the lamps and bounce light from the scene's virtual light meshes."""
+
+    bl_idname = ENGINE_ID
+    bl_label = "Virtual Light Mesh"
+    bl_use_eevee_viewport = True
+    bl_use_postprocess = True
+    bl_use_shading_nodes_custom = False
+
+    def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
+        """Tell the compositor which passes there are."""
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for name in EXTRA_PASSES.values():
+            self.register_pass(scene, renderlayer, name, 3, "RGB", "COLOR")
+
+    def render(self, depsgraph: Any) -> None:
+        """One picture for F12, an animation's frame or `blender -b`."""
+        if self.is_preview:
+            return
+        try:
+            problem = rendering_problem()
+            if problem:
+                raise VlmError(problem)
+            self._write(depsgraph, self._frame(depsgraph))
+        except Cancelled:
+            return
+        except VlmError as error:
+            self.report({"ERROR"}, str(error))
+            self.error_set(str(error))
+
+    def _frame(self, depsgraph: Any) -> Frame:
+        scene = depsgraph.scene
+        self.update_stats("", "Reading the scene")
+        snapshot = extract_scene(depsgraph=depsgraph)
+        technique = scene.vlm.technique
+        light_mesh = None
+        if light_mesh_objects(scene):
+            light_mesh = extract_light_mesh(snapshot)
+        elif technique != DIRECT_TECHNIQUE:
+            technique = DIRECT_TECHNIQUE
+            finding = Finding(
+                f"scene {scene.name!r}", "has no virtual light mesh", "rendered with direct light only; create one"
+            )
+            self.report({"WARNING"}, str(finding))
+        width, height = _picture_size(scene)
+        settings = RenderSettings(width=width, height=height, technique=technique, samples=scene.vlm.samples)
+        return KEPT.render(snapshot, light_mesh, settings, self._progress)
+
+    def _progress(self, fraction: float, label: str) -> bool:
+        self.update_progress(fraction)
+        self.update_stats("", label)
+        return not self.test_break()
+
+    def _write(self, depsgraph: Any, frame: Frame) -> None:
+        left, bottom, right, top = _render_region(depsgraph.scene)
+        result = self.begin_result(0, 0, right - left, top - bottom, layer=depsgraph.view_layer.name)
+        to_working = rec709_to_working()
+        sources = {"Combined": "combined", **{title: name for name, title in EXTRA_PASSES.items()}}
+        for title, name in sources.items():
+            target = result.layers[0].passes.get(title)
+            if target is None:
+                continue
+            pixels = frame.images[name][::-1][bottom:top, left:right].copy()
+            pixels[..., :3] = convert(pixels[..., :3], to_working)
+            target.rect = pixels.reshape(-1, pixels.shape[-1])
+        self.end_result(result)
+
+    def view_update(self, context: Any, depsgraph: Any) -> None:
+        """Nothing to prepare: the rendered viewport shows a message."""
+
+    def view_draw(self, context: Any, depsgraph: Any) -> None:
+        """One line that says how to render."""
+        import blf  # type: ignore[import-not-found]
+
+        font = 0
+        scale = context.preferences.system.ui_scale
+        blf.position(font, MESSAGE_MARGIN * scale, MESSAGE_HEIGHT * scale, 0)
+        blf.size(font, MESSAGE_SIZE * scale)
+        blf.color(font, 1.0, 1.0, 1.0, 1.0)
+        blf.draw(font, VIEW_MESSAGE)
+
+
+def _picture_size(scene: Any) -> tuple[int, int]:
+    render = scene.render
+    return (
+        max(render.resolution_x * render.resolution_percentage // 100, 1),
+        max(render.resolution_y * render.resolution_percentage // 100, 1),
+    )
+
+
+def _render_region(scene: Any) -> tuple[int, int, int, int]:
+    """Left, bottom, right, top of the pixels that Blender asks for: all, or those inside the render border."""
+    width, height = _picture_size(scene)
+    render = scene.render
+    if not render.use_border:
+        return 0, 0, width, height
+    return (
+        int(render.border_min_x * width),
+        int(render.border_min_y * height),
+        int(render.border_max_x * width),
+        int(render.border_max_y * height),
+    )

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What operators with long work share: a progress bar and Esc in the window, plain execution in scripts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+import bpy
+
+from ..core.errors import Cancelled, VlmError
+from ..core.progress import Progress
+from .background_work import BackgroundWork
+
+SECONDS_BETWEEN_LOOKS = 0.05
+PROGRESS_STEPS = 100
+
+T = TypeVar("T")
+
+
+class LongOperator(Generic[T]):
+    """Mixin of bpy.types.Operator in three steps.
+
+    `prepare(context)` reads Blender's data and returns the work, a function of a progress receiver that touches no
+    bpy data; `finish(context, result)` writes the result and reports counts. In the window the work runs in a thread
+    and Esc cancels it; `execute` does all three at once, so scripts, repeat and adjust-last work.
+    """
+
+    report: Callable[[set[str], str], None]
+    _work: BackgroundWork[T]
+    _timer: Any
+
+    def prepare(self, context: bpy.types.Context) -> Callable[[Progress], T]:
+        """The work, with all that it needs. Raises VlmError."""
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context, result: T) -> None:
+        """Write `result` into Blender's data and report what was done. Raises VlmError."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """All steps at once."""
+        window_manager = context.window_manager
+        window_manager.progress_begin(0, PROGRESS_STEPS)
+
+        def progress(fraction: float, label: str) -> bool:
+            window_manager.progress_update(round(fraction * PROGRESS_STEPS))
+            return True
+
+        try:
+            self.finish(context, self.prepare(context)(progress))
+        except VlmError as error:
+            return self._failed(error)
+        finally:
+            window_manager.progress_end()
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Start the work in a thread and look after it from a timer."""
+        if bpy.app.background:
+            return self.execute(context)
+        try:
+            self._work = BackgroundWork(self.prepare(context))
+        except VlmError as error:
+            return self._failed(error)
+        window_manager = context.window_manager
+        window_manager.progress_begin(0, PROGRESS_STEPS)
+        self._timer = window_manager.event_timer_add(SECONDS_BETWEEN_LOOKS, window=context.window)
+        window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Show progress, cancel on Esc, finish when the work has ended; all other events stay Blender's."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self._work.cancel()
+            return {"RUNNING_MODAL"}
+        if self._work.is_running:
+            context.window_manager.progress_update(round(self._work.fraction * PROGRESS_STEPS))
+            context.workspace.status_text_set(f"{self._work.label} {self._work.fraction:.0%}  (Esc cancels)")
+            return {"PASS_THROUGH"}
+        self._clean_up(context)
+        try:
+            self.finish(context, self._work.result())
+        except VlmError as error:
+            return self._failed(error)
+        return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the operator: another file is loaded or the window closes."""
+        self._work.cancel()
+        self._clean_up(context)
+
+    def _clean_up(self, context: bpy.types.Context) -> None:
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
+
+    def _failed(self, error: VlmError) -> set[str]:
+        level = "WARNING" if isinstance(error, Cancelled) else "ERROR"
+        self.report({level}, str(error))
+        return {"CANCELLED"}

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab of the 3D view, in the order of work: create, check, render."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import bpy
+
+from . import authoring, availability
+from .engine import ENGINE_ID
+
+CATEGORY = "VLM"
+PIXELS_PER_CHARACTER = 7
+FINDINGS_SHOWN = 8
+
+
+class _SidebarPanel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+
+
+class VLM_PT_create(_SidebarPanel, bpy.types.Panel):  # noqa: N801 (Blender's naming of classes)
+    """What makes a light mesh."""
+
+    bl_label = "Create"
+
+    def draw(self, context: Any) -> None:
+        """Buttons, the one setting they share, and what the scene lacks."""
+        layout = self.layout
+        scene = context.scene
+        column = layout.column()
+        column.scale_y = 1.5
+        button = column.operator("vlm.light_scene", icon="LIGHT_SUN")
+        button.target_triangles = scene.vlm.target_triangles
+        _hint(layout, context, availability.light_scene_problem(context))
+        layout.prop(scene.vlm, "target_triangles")
+        button = layout.operator("vlm.create_from_selection", icon="MESH_ICOSPHERE")
+        button.target_triangles = scene.vlm.target_triangles
+
+
+class VLM_PT_check(_SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """What the scene's light meshes are and what is wrong with them."""
+
+    bl_label = "Check"
+
+    def draw(self, context: Any) -> None:
+        """The light meshes with their size, the buttons and the findings of the last check."""
+        layout = self.layout
+        light_meshes = availability.light_mesh_objects(context.scene)
+        if not light_meshes:
+            layout.label(text="No light mesh yet", icon="INFO")
+        for thing in light_meshes:
+            layout.label(text=f"{thing.name}: {authoring.lights(len(thing.data.polygons))}", icon="MESH_DATA")
+        row = layout.row(align=True)
+        row.operator("vlm.bake", icon="FILE_REFRESH")
+        row.operator("vlm.check", icon="CHECKMARK")
+        findings = context.scene.vlm.findings
+        for finding in findings[:FINDINGS_SHOWN]:
+            _wrapped(layout.box().column(align=True), context, finding.text, "ERROR")
+        if len(findings) > FINDINGS_SHOWN:
+            layout.label(text=f"and {len(findings) - FINDINGS_SHOWN} more")
+
+
+class VLM_PT_render(_SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """How F12 renders."""
+
+    bl_label = "Render"
+
+    def draw(self, context: Any) -> None:
+        """The engine, its settings and the render button."""
+        layout = self.layout
+        scene = context.scene
+        layout.prop(scene.render, "engine", text="")
+        column = layout.column()
+        column.active = scene.render.engine == ENGINE_ID
+        column.prop(scene.vlm, "technique", text="")
+        column.prop(scene.vlm, "samples")
+        layout.operator("render.render", text="Render Image", icon="RENDER_STILL")
+        _hint(layout, context, availability.rendering_problem())
+
+
+def _hint(layout: Any, context: Any, sentence: str | None) -> None:
+    if sentence:
+        _wrapped(layout.column(align=True), context, sentence, "INFO")
+
+
+def _wrapped(layout: Any, context: Any, sentence: str, icon: str) -> None:
+    width = context.region.width / (context.preferences.system.ui_scale * PIXELS_PER_CHARACTER)
+    for number, line in enumerate(textwrap.wrap(sentence, max(int(width) - 5, 12))):
+        layout.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+CLASSES = (VLM_PT_create, VLM_PT_check, VLM_PT_render)

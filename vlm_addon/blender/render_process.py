@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The renderer's process as the extension uses it: started at the first picture, kept, ended on unregister."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from threading import Lock
+
+from ..core.errors import DeviceError, VlmError
+from ..core.light_mesh import VirtualLightMesh
+from ..core.progress import Progress
+from ..core.scene import SceneSnapshot
+from ..render.client import RenderProcess
+from ..render.frame_types import Frame, RenderSettings
+
+CHILD_MODULES = ("numpy", "moderngl", "glcontext")
+
+
+class KeptRenderProcess:
+    """A renderer process that lives between pictures; pictures asked for at the same time wait for each other."""
+
+    def __init__(self) -> None:
+        self._process: RenderProcess | None = None
+        self._lock = Lock()
+
+    def render(
+        self,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh | None,
+        settings: RenderSettings,
+        progress: Progress,
+    ) -> Frame:
+        """One picture. Raises VlmError; after a DeviceError the next picture starts a new process."""
+        with self._lock:
+            if self._process is None:
+                self._process = RenderProcess(_python(), search_paths())
+            try:
+                return self._process.render(snapshot, light_mesh, settings, progress)
+            except DeviceError:
+                self._close()
+                raise
+
+    def close(self) -> None:
+        """End the process, if there is one."""
+        with self._lock:
+            self._close()
+
+    def _close(self) -> None:
+        if self._process is not None:
+            self._process.close()
+            self._process = None
+
+
+def search_paths() -> list[Path]:
+    """Folders that the child's isolated Python imports from: ours and those of the modules it needs.
+
+    Raises VlmError where a module is missing.
+    """
+    folders = [Path(__file__).resolve().parents[2]]
+    for name in CHILD_MODULES:
+        spec = importlib.util.find_spec(name)
+        if spec is None or spec.origin is None:
+            raise VlmError(f"renderer: the Python module {name} is missing; reinstall the extension")
+        parent = Path(spec.origin).parent
+        folders.append(parent.parent if spec.submodule_search_locations is not None else parent)
+    return list(dict.fromkeys(folders))
+
+
+def _python() -> Path:
+    if not sys.executable:
+        raise VlmError("renderer: Blender's Python was not found; use an official build of Blender")
+    return Path(sys.executable)
+
+
+KEPT = KeptRenderProcess()
+"""Render engines come and go with every picture, so the process they share belongs to this module."""
