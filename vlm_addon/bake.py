@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baking on arrays: the light mesh a scene has or a new one, validated, with a report. Needs no Blender."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .core.errors import InvalidInput
+from .core.light_mesh import VirtualLightMesh, require_valid
+from .core.progress import Progress, silent
+from .core.scene import Finding, SceneSnapshot
+from .core.simplify import SimplifyReport, SimplifySettings, create_light_mesh
+from .core.validate import check_light_mesh
+
+
+@dataclass(frozen=True)
+class Bake:
+    """A validated light mesh. creation: how it was made, None where the scene had one already. findings: what the
+    check, the creation and the extraction found, the check's first."""
+
+    light_mesh: VirtualLightMesh
+    creation: SimplifyReport | None
+    findings: tuple[Finding, ...]
+
+    def report(self) -> dict[str, Any]:
+        """The bake as JSON-able values: counts, powers in m² under unit irradiance, milliseconds, findings."""
+        made: dict[str, Any] = {}
+        if self.creation is not None:
+            made = {
+                "source_triangles": self.creation.source_triangles,
+                "source_reflected_power_m2": list(self.creation.reflected_power_before),
+                "closed_shells_before": self.creation.closed_shells_before,
+                "closed_shells_after": self.creation.closed_shells_after,
+                "share_of_source_in_front_of_its_light": self.creation.share_in_front,
+                "milliseconds": [list(entry) for entry in self.creation.milliseconds],
+            }
+        return {
+            "created": self.creation is not None,
+            "lights": len(self.light_mesh),
+            "vertices": len(self.light_mesh.vertices),
+            "samples": len(self.light_mesh.samples.positions),
+            "area_m2": float(self.light_mesh.areas.sum()),
+            "reflected_power_m2": self.light_mesh.reflected_power.tolist(),
+            **made,
+            "findings": [str(finding) for finding in self.findings],
+        }
+
+
+def bake(
+    snapshot: SceneSnapshot,
+    existing: VirtualLightMesh | None,
+    settings: SimplifySettings | None = None,
+    progress: Progress = silent,
+) -> Bake:
+    """The light mesh of a scene: `existing` where there is one and no `settings` ask for another, else a new one.
+
+    Raises InvalidInput where the scene shows no surface to make lights of, or `existing` holds values that are not
+    finite or negative; Cancelled.
+    """
+    creation = None
+    if existing is not None and settings is None:
+        require_valid(existing)
+        light_mesh = existing
+    else:
+        if not snapshot.triangle_count:
+            problem = "no visible object in it has a surface"
+            raise InvalidInput(f"scene {snapshot.name!r}", problem, "add a mesh or enable one in renders")
+        created = create_light_mesh(snapshot.meshes, settings or SimplifySettings(), progress)
+        light_mesh, creation = created.light_mesh, created.report
+    findings = check_light_mesh(light_mesh, snapshot.meshes)
+    made = creation.findings if creation is not None else ()
+    return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings))

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line, the same as `python -m vlm_addon` and as `blender --command vlm`.
+
+Exit codes: 0 done; 1 failed; 2 bad usage or bad input; 3 findings (`check`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from .core.errors import InvalidInput, VlmError
+
+EXIT_DONE, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_FINDINGS = 0, 1, 2, 3
+
+EXAMPLES = """examples:
+  vlm bake hall.blend --triangles 2000 --save hall_vlm.blend --json hall.json
+  vlm render hall_vlm.blend --technique vlm --size 960x540 --out hall.png
+  vlm check hall_vlm.blend
+  vlm techniques
+
+vlm is `python -m vlm_addon` or `blender --background --command vlm`.
+"""
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run one command; returns its exit code. Errors are one line on standard error."""
+    arguments = _parser().parse_args(list(argv))
+    try:
+        return int(arguments.run(arguments))
+    except VlmError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("error: interrupted; nothing was written", file=sys.stderr)
+        return EXIT_FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="vlm",
+        description="Virtual Light Meshes: bake, render and check scenes without a window.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_bake(commands)
+    _add_render(commands)
+    _add_check(commands)
+    _add_techniques(commands)
+    return parser
+
+
+def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "create the light mesh where the scene has none (or anew with --triangles), check it, write it"
+    command = _command(commands, "bake", text, "vlm bake hall.blend --triangles 2000 --save hall_vlm.blend")
+    _scene_options(command)
+    command.add_argument("--triangles", type=int, metavar="N", help="virtual lights to make; replaces generated ones")
+    command.add_argument("--save", type=Path, metavar="OUT.blend", help="the scene with its light mesh")
+    command.add_argument("--json", type=Path, metavar="REPORT.json", help="what was made, measured and found")
+    command.set_defaults(run=_bake)
+
+
+def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "one picture by one technique"
+    command = _command(commands, "render", text, "vlm render hall_vlm.blend --technique vlm --out hall.exr --samples 64")
+    _scene_options(command)
+    command.add_argument("--technique", required=True, metavar="NAME", help="one of `vlm techniques`")
+    command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of the technique")
+    command.add_argument("--size", type=_size, metavar="WxH", help="pixels; as the scene says without")
+    command.add_argument("--samples", type=int, default=16, metavar="N", help="jittered pictures averaged (16)")
+    command.add_argument("--view", metavar="NAME", help="view transform of a PNG; the scene's without")
+    command.add_argument("--out", type=Path, required=True, metavar="IMG", help=".exr (linear Rec.709) or .png")
+    command.add_argument("--buffers", type=Path, metavar="DIR", help="every intermediate image as EXR into a folder")
+    command.add_argument("--json", type=Path, metavar="REPORT.json", help="times, counts and findings")
+    command.set_defaults(run=_render)
+
+
+def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "what is wrong with the scene's light mesh; exit code 3 if anything is"
+    command = _command(commands, "check", text, "vlm check hall_vlm.blend --json findings.json")
+    _scene_options(command)
+    command.add_argument("--json", type=Path, metavar="REPORT.json", help="the findings")
+    command.set_defaults(run=_check)
+
+
+def _add_techniques(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = _command(commands, "techniques", "techniques with their settings and defaults", "vlm techniques")
+    command.add_argument("--json", type=Path, metavar="REPORT.json", help="the same, machine-readable")
+    command.set_defaults(run=_techniques)
+
+
+def _command(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, text: str, example: str
+) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=text, description=text, epilog=f"example: {example}")
+
+
+def _scene_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("scene", type=Path, metavar="SCENE.blend", help="opened by this command, never changed")
+    command.add_argument("--frame", type=int, metavar="N", help="frame; the file's current one without")
+    command.add_argument("--scene", dest="scene_name", metavar="NAME", help="scene of the file; its current one without")
+    command.add_argument("--view-layer", metavar="NAME", help="view layer; the scene's first without")
+    command.add_argument("--camera", metavar="NAME", help="camera object; the scene's without")
+    command.add_argument("--viewport-levels", action="store_true", help="modifiers as in the viewport")
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, as in 960x540")
+    return int(width), int(height)
+
+
+def _bake(arguments: argparse.Namespace) -> int:
+    from .blender import commands
+
+    return commands.bake(arguments)
+
+
+def _render(arguments: argparse.Namespace) -> int:
+    from .blender import commands
+
+    return commands.render(arguments)
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from .blender import commands
+
+    return EXIT_FINDINGS if commands.check(arguments) else EXIT_DONE
+
+
+def _techniques(arguments: argparse.Namespace) -> int:
+    from .blender import commands
+
+    return commands.techniques(arguments)
