@@ -17,6 +17,7 @@ import bpy
 ZIP, FOLDER = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 SECONDS_FOR_REDRAW = 0.7
 LONGEST_WAIT_SECONDS = 120.0
+GRID = 700
 STORY = {"version": bpy.app.version_string, "seen": []}
 
 
@@ -56,6 +57,7 @@ def look(name):
     """Screenshot of all windows into FOLDER."""
     subprocess.run(["import", "-window", "root", str(FOLDER / f"{name}.png")], check=True)
     STORY["seen"].append(name)
+    print("JOB", name, bpy.app.is_job_running("RENDER"))
 
 
 def until(condition):
@@ -83,6 +85,17 @@ def picture_is_shown():
     return any(
         area.type == "IMAGE_EDITOR" for each in bpy.context.window_manager.windows for area in each.screen.areas
     ) and not bpy.app.is_job_running("RENDER")
+
+
+def nothing_runs():
+    return not any(operator.bl_idname.startswith("VLM_OT") for operator in window().modal_operators)
+
+
+def close_picture():
+    """Close the windows that Blender opened for pictures."""
+    for each in bpy.context.window_manager.windows[1:]:
+        with bpy.context.temp_override(window=each):
+            bpy.ops.wm.window_close()
 
 
 def room():
@@ -119,6 +132,18 @@ def story():
     yield SECONDS_FOR_REDRAW
     look("1_default_file")
 
+    with in_view():
+        STORY["first button"] = sorted(bpy.ops.vlm.light_scene("INVOKE_DEFAULT"))
+    yield from until(there_is_a_light_mesh)
+    yield from until(picture_is_shown)
+    redraw()
+    yield SECONDS_FOR_REDRAW
+    look("2_first_button")
+    bpy.data.images["Render Result"].save_render(str(FOLDER / "first_picture.png"))
+    close_picture()
+    for name in light_meshes():
+        bpy.data.objects.remove(bpy.data.objects[name])
+
     room()
     bpy.ops.ed.undo_push(message="room")
     bpy.ops.object.select_all(action="SELECT")
@@ -127,17 +152,17 @@ def story():
     yield from until(there_is_a_light_mesh)
     redraw()
     yield SECONDS_FOR_REDRAW
-    look("2_created")
+    look("3_created")
     STORY["lights"] = {name: len(bpy.data.objects[name].data.polygons) for name in light_meshes()}
 
     press("Z", ctrl=True)
     yield from until(there_is_none)
     yield SECONDS_FOR_REDRAW
-    look("3_undone")
+    look("4_undone")
     press("Z", ctrl=True, shift=True)
     yield from until(there_is_a_light_mesh)
     yield SECONDS_FOR_REDRAW
-    look("4_redone")
+    look("5_redone")
 
     with in_view():
         STORY["check"] = sorted(bpy.ops.vlm.check("INVOKE_DEFAULT"))
@@ -145,24 +170,34 @@ def story():
     yield from until(picture_is_shown)
     redraw()
     yield SECONDS_FOR_REDRAW
-    look("5_lit")
+    look("6_lit")
     STORY["engine"] = bpy.context.scene.render.engine
     bpy.data.images["Render Result"].save_render(str(FOLDER / "render_result.png"))
 
-    for each in bpy.context.window_manager.windows[1:]:
-        with bpy.context.temp_override(window=each):
-            bpy.ops.wm.window_close()
+    close_picture()
     area, _ = view()
     area.spaces.active.shading.type = "RENDERED"
     redraw()
     yield SECONDS_FOR_REDRAW
-    look("6_rendered_view")
+    look("7_rendered_view")
     area.spaces.active.shading.type = "SOLID"
+
+    for name in light_meshes():
+        bpy.data.objects.remove(bpy.data.objects[name])
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=GRID, y_subdivisions=GRID, size=2.0)
+    with in_view():
+        STORY["long work"] = sorted(bpy.ops.vlm.create_from_selection("INVOKE_DEFAULT", target_triangles=100))
+    yield SECONDS_FOR_REDRAW
+    STORY["ran at Esc"] = not nothing_runs()
+    look("8_progress")
+    press("ESC")
+    yield from until(nothing_runs)
+    STORY["after Esc"] = light_meshes()
 
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.virtual_light_mesh")
     redraw()
     yield SECONDS_FOR_REDRAW
-    look("7_disabled")
+    look("9_disabled")
     STORY["finished"] = True
 
 

@@ -52,7 +52,7 @@ def story(tmp_path_factory):
     keep = os.environ.get("VLM_SCREENSHOTS")
     if keep:
         shutil.copytree(folder, keep, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.zip", "*.json", "*.py"))
-    return {**told, "folder": folder, "output": done.stdout + done.stderr}
+    return {**told, "folder": folder, "output": print(done.stdout) or done.stdout + done.stderr}
 
 
 def command(chroot, folder, package):
@@ -86,13 +86,23 @@ def test_the_zip_installs_and_enables(story):
     assert story["enabled"]
 
 
+def test_one_button_lights_the_default_file(story):
+    assert story["first button"] == ["RUNNING_MODAL"]
+    assert pixels(story["folder"] / "first_picture.png").max() > 0.2
+
+
 def test_creating_runs_beside_the_window_and_makes_lights(story):
     assert story["create"] == ["RUNNING_MODAL"]
     assert all(0 < count <= 200 for count in story["lights"].values())
 
 
 def test_undo_takes_the_light_mesh_away_and_redo_brings_it_back(story):
-    assert {"3_undone", "4_redone"} <= set(story["seen"])
+    assert {"4_undone", "5_redone"} <= set(story["seen"])
+
+
+def test_esc_stops_long_work_and_nothing_is_made(story):
+    assert story["ran at Esc"]
+    assert story["after Esc"] == []
 
 
 def test_light_scene_shows_a_picture_lit_by_our_engine(story):

@@ -11,14 +11,16 @@ import bpy
 
 from ..bake import Bake, bake
 from ..core.errors import InvalidInput, VlmError
+from ..core.light_mesh import empty_light_mesh
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..core.simplify import SimplifySettings
 from ..core.validate import check_light_mesh
-from .availability import light_mesh_objects
+from .availability import has_geometry, light_mesh_objects, rendered_objects
 from .engine import ENGINE_ID
 from .extract import ExtractOptions, extract_scene, require_camera, require_lights
-from .light_mesh_io import extract_light_mesh
+from .light_mesh_io import Extraction, extract
+from .names import SOURCES_PROPERTY
 from .write_back import write_light_mesh
 
 NAME = "VLM"
@@ -26,44 +28,51 @@ NAME = "VLM"
 
 @dataclass(frozen=True)
 class Made:
-    """A bake and where it goes: the scene's name and the light mesh's; name is None where the scene keeps its own."""
+    """A bake and where it goes: the scene's name, the light mesh's name and the objects that it was made from.
 
-    scene: str
-    name: str | None
+    name is None where the scene keeps the light meshes that it has.
+    """
+
     bake: Bake
+    scene: str
+    name: str | None = None
+    sources: tuple[str, ...] = ()
 
 
 def from_selection(context: Any, settings: SimplifySettings) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the selected objects."""
-    chosen = [thing.name for thing in context.selected_objects]
-    snapshot = extract_scene(ExtractOptions(objects=frozenset(chosen)))
+    sources = tuple(thing.name for thing in context.selected_objects if has_geometry(thing))
+    snapshot = extract_scene(ExtractOptions(objects=frozenset(sources)))
     active = context.active_object
-    name = f"{NAME} {active.name if active is not None and active.name in chosen else chosen[0]}"
-    return _work(context.scene.name, name, snapshot, settings)
+    named_after = active.name if active is not None and active.name in sources else sources[0]
+    return _work(snapshot, f"{NAME} {named_after}", sources, settings)
 
 
 def from_visible_scene(context: Any, settings: SimplifySettings) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the visible scene where it has none, and checks the one it has."""
-    return _work_on_scene(context.scene, extract_scene(), settings)
+    return _work_on_scene(context, extract(), settings)
 
 
 def from_lit_scene(context: Any, settings: SimplifySettings) -> Callable[[Progress], Made]:
     """The same for a scene that is about to be rendered. Raises InvalidInput where nothing in it sends out light."""
-    snapshot = extract_scene()
-    require_camera(snapshot)
-    require_lights(snapshot)
-    return _work_on_scene(context.scene, snapshot, settings)
+    found = extract()
+    require_camera(found.snapshot)
+    require_lights(found.snapshot)
+    return _work_on_scene(context, found, settings)
 
 
-def _work_on_scene(scene: Any, snapshot: SceneSnapshot, settings: SimplifySettings) -> Callable[[Progress], Made]:
-    if light_mesh_objects(scene):
-        existing = extract_light_mesh(snapshot)
-        return lambda progress: Made(scene.name, None, bake(snapshot, existing, None, progress))
-    return _work(scene.name, NAME, snapshot, settings)
+def _work_on_scene(context: Any, found: Extraction, settings: SimplifySettings) -> Callable[[Progress], Made]:
+    snapshot, existing = found.snapshot, found.light_mesh
+    if existing is None:
+        sources = tuple(thing.name for thing in rendered_objects(context) if has_geometry(thing))
+        return _work(snapshot, NAME, sources, settings)
+    return lambda progress: Made(bake(snapshot, existing, None, progress), snapshot.name)
 
 
-def _work(scene: str, name: str, snapshot: SceneSnapshot, settings: SimplifySettings) -> Callable[[Progress], Made]:
-    return lambda progress: Made(scene, name, bake(snapshot, None, settings, progress))
+def _work(
+    snapshot: SceneSnapshot, name: str, sources: tuple[str, ...], settings: SimplifySettings
+) -> Callable[[Progress], Made]:
+    return lambda progress: Made(bake(snapshot, None, settings, progress), snapshot.name, name, sources)
 
 
 def write(made: Made) -> str:
@@ -71,19 +80,32 @@ def write(made: Made) -> str:
     scene = bpy.data.scenes.get(made.scene)
     if scene is None:
         raise InvalidInput(f"scene {made.scene!r}", "it is gone", "create the light mesh again")
-    list_findings(scene, made.bake.findings)
+    list_findings(scene, (*_counted_twice(scene, made), *made.bake.findings))
     count = lights(len(made.bake.light_mesh))
     if made.name is None or made.bake.creation is None:
         return f"Kept the {count} that the scene has"
-    write_light_mesh(made.bake.light_mesh, made.name, scene)
+    write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
     seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
     return f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s"
 
 
+def _counted_twice(scene: Any, made: Made) -> list[Finding]:
+    """A finding for each light mesh of the scene that stands for some of the same objects."""
+    findings = []
+    for other in light_mesh_objects(scene):
+        shared = sorted(set(made.sources) & set(str(other.get(SOURCES_PROPERTY, "")).split("\n")))
+        if shared and other.name != made.name:
+            problem = f"{shared[0]!r} and {len(shared) - 1} more" if len(shared) > 1 else repr(shared[0])
+            problem += f" already bounce light in {other.name!r}, so it counts twice"
+            findings.append(Finding(f"light mesh {made.name!r}", problem, "delete one of the two light meshes"))
+    return findings
+
+
 def check(context: Any) -> tuple[Finding, ...]:
     """What is wrong with the light meshes of the scene, and what extraction had to approximate; also listed."""
-    snapshot = extract_scene()
-    findings = (*check_light_mesh(extract_light_mesh(snapshot), snapshot.meshes), *snapshot.findings)
+    found = extract()
+    light_mesh = found.light_mesh if found.light_mesh is not None else empty_light_mesh()
+    findings = (*check_light_mesh(light_mesh, found.snapshot.meshes), *found.snapshot.findings)
     list_findings(context.scene, findings)
     return findings
 

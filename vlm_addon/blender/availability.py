@@ -58,7 +58,7 @@ def selection_problem(context: bpy.types.Context) -> str | None:
 
 def visible_scene_problem(context: bpy.types.Context) -> str | None:
     """Why the visible scene gives no light mesh, or None."""
-    if not any(has_geometry(thing) for thing in _rendered(context)):
+    if not any(has_geometry(thing) for thing in rendered_objects(context)):
         return "The scene shows no surfaces: add a mesh (Add > Mesh) or enable an object for rendering"
     return authoring_problem()
 
@@ -77,5 +77,6 @@ def light_scene_problem(context: bpy.types.Context) -> str | None:
     return rendering_problem() or visible_scene_problem(context)
 
 
-def _rendered(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+def rendered_objects(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+    """The objects of the view layer that are enabled for renders."""
     return (thing for thing in context.view_layer.objects if not thing.hide_render)

@@ -10,10 +10,10 @@ import bpy
 from ..core.errors import Cancelled, VlmError
 from ..core.scene import Finding
 from ..render.frame_types import Frame, RenderSettings
-from .availability import light_mesh_objects, rendering_problem
+from ..render.technique import technique_by_name
+from .availability import rendering_problem
 from .color_space import convert, rec709_to_working
-from .extract import extract_scene
-from .light_mesh_io import extract_light_mesh
+from .light_mesh_io import extract
 from .render_process import KEPT
 
 ENGINE_ID = "VLM_ENGINE"
@@ -58,12 +58,9 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
     def _frame(self, depsgraph: Any) -> Frame:
         scene = depsgraph.scene
         self.update_stats("", "Reading the scene")
-        snapshot = extract_scene(depsgraph=depsgraph)
+        found = extract(depsgraph=depsgraph)
         technique = scene.vlm.technique
-        light_mesh = None
-        if light_mesh_objects(scene):
-            light_mesh = extract_light_mesh(snapshot)
-        elif technique != DIRECT_TECHNIQUE:
+        if found.light_mesh is None and technique_by_name(technique).needs_light_mesh:
             technique = DIRECT_TECHNIQUE
             finding = Finding(
                 f"scene {scene.name!r}", "has no virtual light mesh", "rendered with direct light only; create one"
@@ -71,7 +68,7 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
             self.report({"WARNING"}, str(finding))
         width, height = _picture_size(scene)
         settings = RenderSettings(width=width, height=height, technique=technique, samples=scene.vlm.samples)
-        return KEPT.render(snapshot, light_mesh, settings, self._progress)
+        return KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
 
     def _progress(self, fraction: float, label: str) -> bool:
         self.update_progress(fraction)

@@ -13,6 +13,7 @@ from .engine import ENGINE_ID
 
 CATEGORY = "VLM"
 PIXELS_PER_CHARACTER = 7
+LABEL_SHARE = 0.38
 FINDINGS_SHOWN = 8
 
 
@@ -73,13 +74,20 @@ class VLM_PT_render(_SidebarPanel, bpy.types.Panel):  # noqa: N801
         """The engine, its settings and the render button."""
         layout = self.layout
         scene = context.scene
-        layout.prop(scene.render, "engine", text="")
+        _labelled(layout, scene.render, "engine")
         column = layout.column()
         column.active = scene.render.engine == ENGINE_ID
-        column.prop(scene.vlm, "technique", text="")
+        _labelled(column, scene.vlm, "technique")
         column.prop(scene.vlm, "samples")
         layout.operator("render.render", text="Render Image", icon="RENDER_STILL")
         _hint(layout, context, availability.rendering_problem())
+
+
+def _labelled(layout: Any, owner: Any, name: str) -> None:
+    # a plain menu in a narrow sidebar cuts its label off
+    split = layout.split(factor=LABEL_SHARE)
+    split.label(text=owner.bl_rna.properties[name].name)
+    split.prop(owner, name, text="")
 
 
 def _hint(layout: Any, context: Any, sentence: str | None) -> None:
