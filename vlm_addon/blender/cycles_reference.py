@@ -17,8 +17,7 @@ from ..core.errors import InvalidInput, VlmError
 from ..core.exr import image_of, read_exr
 from ..core.scene import Float32
 from .color_space import convert, working_to_rec709
-from .evaluation import no_render_handlers, only_layer
-from .names import is_light_mesh
+from .evaluation import light_meshes_in_render, no_render_handlers, only_layer
 from .temporary import restored
 
 CONVERGED_BOUNCES = 32
@@ -89,7 +88,7 @@ def render_reference(
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="vlm_reference_")))
         stack.enter_context(_reference_settings(scene, view_layer, width, height, diffuse_bounces, caustics))
-        stack.enter_context(_light_meshes_hidden())
+        stack.enter_context(light_meshes_in_render(shown=False))
         shares = (samples - samples // 2, samples // 2)
         halves = [_render(scene, view_layer, folder, seed + i * SEED_STEP, count) for i, count in enumerate(shares)]
     images = {name: 0.5 * (halves[0][name] + halves[1][name]) for name in halves[0]}
@@ -193,15 +192,6 @@ def _cycles_settings(diffuse_bounces: int, caustics: bool) -> dict[str, Any]:
         "direct_light_sampling_type": "MULTIPLE_IMPORTANCE_SAMPLING",
         "debug_use_spatial_splits": False,
     }
-
-
-@contextmanager
-def _light_meshes_hidden() -> Iterator[None]:
-    """Virtual light meshes are no geometry, even where somebody has switched them on for renders."""
-    with ExitStack() as stack:
-        for blender_object in filter(is_light_mesh, bpy.data.objects):
-            stack.enter_context(restored(blender_object, hide_render=True))
-        yield
 
 
 def _render(scene: Any, view_layer: Any, folder: Path, seed: int, samples: int) -> dict[str, Float32]:

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import bpy
 
 from ..core.errors import VlmError
+from .names import is_light_mesh
 from .temporary import restored
 
 T = TypeVar("T")
@@ -36,6 +37,32 @@ class _KeptError:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> bool:
         self.error = error
         return True
+
+
+def evaluate(
+    function: Callable[[Any], T], viewport_levels: bool = False, depsgraph: Any = None, light_meshes: bool = False
+) -> T:
+    """What `function` returns for `depsgraph`, or for the current view layer evaluated as for a render.
+
+    viewport_levels: take the viewport's evaluation instead. light_meshes: show virtual light meshes to the render's,
+    although they are hidden from renders.
+    """
+    if depsgraph is not None:
+        return function(depsgraph)
+    if viewport_levels:
+        return function(bpy.context.evaluated_depsgraph_get())
+    with light_meshes_in_render(shown=light_meshes):
+        return with_render_depsgraph(bpy.context.scene, bpy.context.view_layer, function)
+
+
+@contextmanager
+def light_meshes_in_render(shown: bool) -> Iterator[None]:
+    """Virtual light meshes are shown to renders, or hidden from them even where somebody has switched them on."""
+    with ExitStack() as stack:
+        for blender_object in filter(is_light_mesh, bpy.data.objects):
+            if blender_object.hide_render == shown:
+                stack.enter_context(restored(blender_object, hide_render=not shown))
+        yield
 
 
 def with_render_depsgraph(scene: Any, view_layer: Any, function: Callable[[Any], T]) -> T:

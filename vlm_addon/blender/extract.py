@@ -3,24 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
-import bpy
 import numpy as np
 
 from ..core.errors import InvalidInput
 from ..core.scene import Camera, Float64, Light, Mesh, SceneSnapshot
 from .color_space import working_to_rec709
-from .evaluation import with_render_depsgraph
+from .evaluation import evaluate
 from .lamps import read_camera, read_light
 from .materials import FindingList, MaterialTable
 from .mesh_extraction import SURFACE_TYPES, MeshExtractor
 from .names import is_light_mesh
 from .world import read_world
-
-T = TypeVar("T")
 
 IGNORED_TYPES = ("ARMATURE", "EMPTY", "LATTICE", "SPEAKER", "CAMERA", "LIGHT_PROBE")
 """Object types that no renderer draws."""
@@ -31,12 +27,13 @@ class ExtractOptions:
     """What to extract.
 
     viewport_levels: modifiers as in the viewport instead of as in a render. objects: names of objects; where given,
-    only they and what is instanced by them are extracted as surfaces.
-
+    only they and what is instanced by them are extracted as surfaces. samples_per_light: points at which the light on
+    a virtual light of median size is measured, for light meshes read from the scene.
     """
 
     viewport_levels: bool = False
     objects: frozenset[str] | None = None
+    samples_per_light: int = 16
 
 
 def extract_scene(options: ExtractOptions | None = None, depsgraph: Any = None) -> SceneSnapshot:
@@ -47,15 +44,12 @@ def extract_scene(options: ExtractOptions | None = None, depsgraph: Any = None) 
     a scale of zero.
     """
     options = options or ExtractOptions()
-    return _evaluated(options, depsgraph, lambda graph: _Extraction(graph, options).snapshot())
+    return evaluate(lambda graph: extract_from(graph, options), options.viewport_levels, depsgraph)
 
 
-def _evaluated(options: ExtractOptions, depsgraph: Any, function: Callable[[Any], T]) -> T:
-    if depsgraph is not None:
-        return function(depsgraph)
-    if options.viewport_levels:
-        return function(bpy.context.evaluated_depsgraph_get())
-    return with_render_depsgraph(bpy.context.scene, bpy.context.view_layer, function)
+def extract_from(depsgraph: Any, options: ExtractOptions) -> SceneSnapshot:
+    """`extract_scene` for a depsgraph that is there."""
+    return _Extraction(depsgraph, options).snapshot()
 
 
 def require_camera(snapshot: SceneSnapshot) -> Camera:

@@ -12,6 +12,7 @@ SCHEMA_PROPERTY = "vlm_schema"
 STRENGTH_PROPERTY = "vlm_strength"
 HUE_PROPERTY = "vlm_hue"
 DYNAMIC_PROPERTY = "vlm_dynamic"
+SOURCES_PROPERTY = "vlm_sources"
 
 COLOR_ATTRIBUTE = "vlm_color"
 EMISSION_ATTRIBUTE = "vlm_emission"

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The virtual light meshes of the open scene as arrays, with the points of the visible surface that they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.errors import InvalidInput
+from ..core.light_mesh import VirtualLightMesh, join, require_valid
+from ..core.scene import Float32, Float64, SceneSnapshot
+from .color_space import convert, working_to_rec709
+from .dynamics import is_dynamic
+from .evaluation import evaluate
+from .extract import ExtractOptions, extract_from
+from .materials import FindingList
+from .mesh_arrays import face_attribute, flipped, read_mesh
+from .names import (
+    AREA_SCALE_ATTRIBUTE,
+    COLOR_ATTRIBUTE,
+    DYNAMIC_PROPERTY,
+    EMISSION_ATTRIBUTE,
+    HUE_PROPERTY,
+    SCHEMA_PROPERTY,
+    SCHEMA_VERSION,
+    STRENGTH_PROPERTY,
+    TAG_ATTRIBUTE,
+    is_light_mesh,
+)
+from .source_points import find_source_points, unsampled
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """One evaluation of a scene: what it shows, and its virtual lights (None where it has none)."""
+
+    snapshot: SceneSnapshot
+    light_mesh: VirtualLightMesh | None
+
+
+def extract(options: ExtractOptions | None = None, depsgraph: Any = None) -> Extraction:
+    """`extract_scene` and `extract_light_mesh` from one evaluation; the snapshot's findings are those of both."""
+    options = options or ExtractOptions()
+    snapshot, lights, report = evaluate(
+        lambda graph: _both(graph, options), options.viewport_levels, depsgraph, light_meshes=True
+    )
+    light_mesh = _with_source_points(lights, snapshot, options, report)
+    findings = dict.fromkeys((*snapshot.findings, *report.findings))
+    return Extraction(replace(snapshot, findings=tuple(findings)), light_mesh)
+
+
+def extract_light_mesh(
+    snapshot: SceneSnapshot,
+    options: ExtractOptions | None = None,
+    depsgraph: Any = None,
+    report: FindingList | None = None,
+) -> VirtualLightMesh | None:
+    """All virtual lights of the current view layer, or None where no object carries any.
+
+    Objects are found by their property `vlm_schema`, whatever they are called and although they are hidden from
+    renders, and read with their modifiers. Where phase one measures is found by rays onto the meshes of `snapshot`.
+    report takes what had to be approximated. Raises InvalidInput for values that no light can have.
+    """
+    options = options or ExtractOptions()
+    report = report if report is not None else FindingList()
+    lights = evaluate(
+        lambda graph: read_light_meshes(graph, report), options.viewport_levels, depsgraph, light_meshes=True
+    )
+    return _with_source_points(lights, snapshot, options, report)
+
+
+def _both(depsgraph: Any, options: ExtractOptions) -> tuple[SceneSnapshot, list[VirtualLightMesh], FindingList]:
+    report = FindingList()
+    return extract_from(depsgraph, options), read_light_meshes(depsgraph, report), report
+
+
+def _with_source_points(
+    lights: list[VirtualLightMesh], snapshot: SceneSnapshot, options: ExtractOptions, report: FindingList
+) -> VirtualLightMesh | None:
+    if not lights:
+        return None
+    light_mesh = join(lights)
+    samples, missed = find_source_points(light_mesh, snapshot.meshes, options.samples_per_light)
+    if missed:
+        problem = f"{missed} of {len(light_mesh)} lights have no visible surface in front of them"
+        report("light mesh", problem, "the light on them is measured at the lights themselves")
+    found = replace(light_mesh, samples=samples)
+    require_valid(found)
+    return found
+
+
+def read_light_meshes(depsgraph: Any, report: FindingList) -> list[VirtualLightMesh]:
+    """The light meshes of a depsgraph, one per object or instance, without source points."""
+    to_rec709 = working_to_rec709()
+    found, seen = [], set()
+    for instance in depsgraph.object_instances:
+        if is_light_mesh(instance.object) and instance.object.type == "MESH":
+            seen.add(instance.object.name_full)
+            matrix = np.array(instance.matrix_world, np.float64)
+            found.append(_read_object(instance.object, matrix, to_rec709, report))
+    for blender_object in _left_out(depsgraph, seen, report):
+        matrix = np.array(blender_object.matrix_world, np.float64)
+        found.append(_read_object(blender_object, matrix, to_rec709, report))
+    return [lights for lights in found if len(lights)]
+
+
+def _left_out(depsgraph: Any, seen: set[str], report: FindingList) -> Iterator[Any]:
+    """Light meshes of the view layer that this depsgraph has not evaluated because it does not show them.
+
+    They are taken as the viewport has them, or unmodified where it has not evaluated them either.
+    """
+    layer = depsgraph.view_layer.original if hasattr(depsgraph.view_layer, "original") else depsgraph.view_layer
+    scene = depsgraph.scene.original
+    layer = scene.view_layers[layer.name]
+    for blender_object in layer.objects:
+        if blender_object.type != "MESH" or not is_light_mesh(blender_object) or blender_object.name_full in seen:
+            continue
+        evaluated = blender_object.evaluated_get(layer.depsgraph) if layer.depsgraph else blender_object
+        if not evaluated.is_evaluated and len(blender_object.modifiers):
+            report(f"light mesh {blender_object.name!r}", "its modifiers are not evaluated", "show it in the viewport")
+        yield evaluated
+
+
+def _read_object(blender_object: Any, matrix: Float64, to_rec709: Float64, report: FindingList) -> VirtualLightMesh:
+    owner = f"light mesh {blender_object.name!r}"
+    version = blender_object[SCHEMA_PROPERTY]
+    if version != SCHEMA_VERSION:
+        problem = f"{SCHEMA_PROPERTY} is {version}, not {SCHEMA_VERSION}"
+        raise InvalidInput(owner, problem, "open it with the version of the extension that wrote it")
+    mesh = blender_object.to_mesh()
+    try:
+        return _read_lights(blender_object, mesh, matrix, owner, to_rec709, report)
+    finally:
+        blender_object.to_mesh_clear()
+
+
+def _read_lights(
+    blender_object: Any, mesh: Any, matrix: Float64, owner: str, to_rec709: Float64, report: FindingList
+) -> VirtualLightMesh:
+    local = read_mesh(mesh, owner)
+    if not len(local.triangles):
+        raise InvalidInput(owner, "it has no faces", "add faces or delete it")
+    count = len(mesh.polygons)
+    color = face_attribute(mesh, COLOR_ATTRIBUTE, "FLOAT_COLOR")
+    if color is None:
+        report(owner, f"it has no face attribute {COLOR_ATTRIBUTE!r}", "its lights reflect as white")
+        color = np.ones((count, 4), np.float32)
+    emission = face_attribute(mesh, EMISSION_ATTRIBUTE, "FLOAT_COLOR")
+    area_scale = face_attribute(mesh, AREA_SCALE_ATTRIBUTE, "FLOAT")
+    area_scale = np.ones(count, np.float32) if area_scale is None else area_scale
+    tags = face_attribute(mesh, TAG_ATTRIBUTE, "INT")
+    hue = np.array(blender_object.get(HUE_PROPERTY, WHITE), np.float32)[:3]
+    strength = np.float32(blender_object.get(STRENGTH_PROPERTY, 1.0))
+    original = blender_object.original
+
+    def tinted(values: np.ndarray | None) -> Float32:
+        rgb = np.zeros((count, 3), np.float32) if values is None else values[:, :3]
+        return convert(rgb * hue, to_rec709)[local.faces]
+
+    mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
+    lights = len(local.triangles)
+    return VirtualLightMesh(
+        vertices=local.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3],
+        triangles=flipped(local.triangles) if mirrored else local.triangles,
+        colour=tinted(color),
+        emission=tinted(emission),
+        strength=strength * area_scale[local.faces],
+        tag_ids=(np.zeros(count, np.int32) if tags is None else tags)[local.faces],
+        dynamic=np.full(lights, bool(blender_object.get(DYNAMIC_PROPERTY, False)) or is_dynamic(original)),
+        samples=unsampled(lights),
+    )
+
+
+def light_mesh_objects(view_layer: Any = None) -> list[Any]:
+    """The (original) light mesh objects of a view layer, by default the current one."""
+    layer = view_layer or bpy.context.view_layer
+    return [item for item in layer.objects if item.type == "MESH" and is_light_mesh(item)]
