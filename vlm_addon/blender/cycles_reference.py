@@ -18,7 +18,7 @@ from ..core.exr import image_of, read_exr
 from ..core.scene import Float32
 from .color_space import convert, working_to_rec709
 from .evaluation import light_meshes_in_render, no_render_handlers, only_layer
-from .temporary import restored
+from .temporary import present, restored
 
 CONVERGED_BOUNCES = 32
 MINIMAL_SAMPLES = 2
@@ -141,16 +141,12 @@ def _reference_settings(
         stack.enter_context(restored(view_layer, **dict.fromkeys(LAYER_PASSES, True)))
         stack.enter_context(restored(view_layer.cycles, use_denoising=False, pass_debug_sample_count=False))
         stack.enter_context(restored(scene.cycles, **_cycles_settings(diffuse_bounces, caustics)))
-        stack.enter_context(restored(settings, **_present(settings, _IMAGE_SETTINGS)))
+        stack.enter_context(restored(settings, **present(settings, _IMAGE_SETTINGS)))
         yield
 
 
 # Restored from the last to the first: a file format is offered only with its media type.
 _IMAGE_SETTINGS = ("use_exr_interleave", "exr_codec", "color_depth", "color_mode", "file_format", "media_type")
-
-
-def _present(owner: Any, names: tuple[str, ...]) -> dict[str, Any]:
-    return {name: getattr(owner, name) for name in names if hasattr(owner, name)}
 
 
 def _cycles_settings(diffuse_bounces: int, caustics: bool) -> dict[str, Any]:

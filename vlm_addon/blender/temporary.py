@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -24,3 +24,8 @@ def restored(owner: Any, **values: Any) -> Iterator[None]:
     finally:
         for name, value in reversed(changed):
             setattr(owner, name, value)
+
+
+def present(owner: Any, names: Sequence[str]) -> dict[str, Any]:
+    """The values of those properties of a Blender struct that this version of Blender knows."""
+    return {name: getattr(owner, name) for name in names if hasattr(owner, name)}

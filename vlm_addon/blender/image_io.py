@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures to files: EXR in linear Rec.709, PNG as the scene's view transform shows them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.errors import InvalidInput, VlmError
+from ..core.exr import image_of, read_exr, write_exr
+from ..core.scene import Float32
+from .color_space import convert, rec709_to_working
+from .scene_file import atomic_output
+from .temporary import present, restored
+
+EXR, PNG = ".exr", ".png"
+
+
+def write_image(path: Path | str, image: Float32, *, view: str | None = None, scene: Any = None) -> None:
+    """Writes a picture in the format of the path's suffix: `.exr` or `.png`. It appears whole or not at all.
+
+    image: (h, w, 1, 3 or 4) float32, linear Rec.709, row 0 at the top, alpha premultiplied. view: for PNG, the name of
+    a view transform instead of the scene's. Raises InvalidInput for another suffix, shape or view, or a path that
+    cannot be written.
+    """
+    path = Path(path)
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or not image.size:
+        raise InvalidInput(f"image of shape {image.shape}", "it is not a picture", "give (height, width, 1, 3 or 4)")
+    suffix = require_format(path)
+    with atomic_output(path) as temporary:
+        if suffix == EXR:
+            write_exr(temporary, image)
+        else:
+            _write_png(temporary, image, view, scene or bpy.context.scene)
+
+
+def require_format(path: Path | str) -> str:
+    """The suffix of a picture's path in lower case. Raises InvalidInput unless it is one that can be written."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in (EXR, PNG):
+        problem = f"pictures of type {suffix or 'none'} are not written"
+        raise InvalidInput(str(path), problem, f"end the name in {EXR} or {PNG}")
+    return suffix
+
+
+def read_image(path: Path | str) -> Float32:
+    """(h, w, c) float32 of an EXR that `write_image` wrote, row 0 at the top."""
+    channels = read_exr(Path(path))
+    names = "Y" if "Y" in channels else "RGBA" if "A" in channels else "RGB"
+    return image_of(channels, names=names)
+
+
+def view_transforms(scene: Any = None) -> list[str]:
+    """Names of the view transforms that the scene's display offers."""
+    settings = (scene or bpy.context.scene).view_settings
+    try:
+        # The names depend on the display; an assignment that fails lists those of this one.
+        settings.view_transform = ""
+    except TypeError as error:
+        return re.findall(r"'([^']+)'", str(error).partition("not found in")[2])
+    return []
+
+
+def _write_png(path: Path, image: Float32, view: str | None, scene: Any) -> None:
+    with ExitStack() as stack:
+        if view is not None:
+            stack.enter_context(_view(scene, view))
+        stack.enter_context(_png_settings(scene, image.shape[2]))
+        datablock = stack.enter_context(_image_datablock(image))
+        try:
+            datablock.save_render(str(path), scene=scene)
+        except RuntimeError as error:
+            raise VlmError(f"{path}: Blender could not write it ({' '.join(str(error).split())})") from error
+
+
+@contextmanager
+def _view(scene: Any, view: str) -> Iterator[None]:
+    settings = scene.view_settings
+    # A look belongs to its view transform.
+    kept = (settings.view_transform, settings.look)
+    try:
+        try:
+            settings.view_transform = view
+        except TypeError:
+            names = ", ".join(view_transforms(scene))
+            subject = f"view transform {view!r}"
+            raise InvalidInput(subject, "there is none of that name", f"use one of: {names}") from None
+        settings.look = "None"
+        yield
+    finally:
+        settings.view_transform, settings.look = kept
+
+
+@contextmanager
+def _png_settings(scene: Any, channels: int) -> Iterator[None]:
+    settings = scene.render.image_settings
+    # Restored from the last to the first: a file format is offered only with its media type.
+    names = ("compression", "color_depth", "color_mode", "file_format", "media_type", "color_management")
+    with ExitStack() as stack:
+        stack.enter_context(restored(scene.render, dither_intensity=0.0))
+        stack.enter_context(restored(settings, **present(settings, names)))
+        if hasattr(settings, "media_type"):
+            settings.media_type = "IMAGE"
+        settings.file_format = "PNG"
+        settings.color_mode = "RGBA" if channels == 4 else "RGB"
+        settings.color_depth = "8"
+        settings.color_management = "FOLLOW_SCENE"
+        yield
+
+
+@contextmanager
+def _image_datablock(image: Float32) -> Iterator[Any]:
+    height, width, channels = image.shape
+    rgba = np.ones((height, width, 4), np.float32)
+    rgba[..., : max(channels, 3)] = image
+    rgba[..., :3] = convert(rgba[..., :3], rec709_to_working())
+    datablock = bpy.data.images.new("vlm temporary", width, height, alpha=True, float_buffer=True)
+    try:
+        datablock.alpha_mode = "PREMUL"
+        datablock.pixels.foreach_set(np.ascontiguousarray(rgba[::-1]).ravel())
+        yield datablock
+    finally:
+        bpy.data.images.remove(datablock)
