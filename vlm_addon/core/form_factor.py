@@ -148,7 +148,7 @@ def _integrated(outline: Float64, heights: Float64, area_vectors: Float64, order
     origin, origin_height = outline[:, 0], heights[:, 0]
     for i in range(1, outline.shape[1] - 1):
         side, far_side = outline[:, i] - origin, outline[:, i + 1] - outline[:, i]
-        double_area = np.linalg.norm(np.cross(side, far_side), axis=-1)
+        double_area = (np.cross(side, far_side) * unit).sum(-1)
         for u, u_weight in zip(nodes, node_weights, strict=True):
             for v, v_weight in zip(nodes, node_weights, strict=True):
                 position = origin + u * (side + v * far_side)

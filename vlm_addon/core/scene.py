@@ -97,7 +97,8 @@ class Light:
     """A lamp in Blender's units.
 
     power: linear Rec.709, W for POINT, SPOT and AREA; irradiance on a facing surface in W/m² for SUN. The light
-    shines along -z of its frame: x_axis, y_axis, z_axis are unit vectors in world space. radius: m (POINT, SPOT).
+    shines along -z of its frame: x_axis, y_axis, z_axis are unit vectors in world space. radius: m (POINT, SPOT);
+    soft_falloff: its lamp is a disk turned to each receiver (Blender's default) rather than a ball.
     angle: full angular diameter of a SUN. spot_angle: full cone angle; spot_blend: 0 hard to 1 soft. size_x, size_y:
     m, full extents of an AREA light of `shape` RECTANGLE or ELLIPSE. spot_scale: the object's scale relative to its
     z axis, which squashes the cone in x and y.
@@ -119,6 +120,7 @@ class Light:
     size_x: float = 1.0
     size_y: float = 1.0
     casts_shadow: bool = True
+    soft_falloff: bool = True
 
 
 @dataclass(frozen=True)
