@@ -18,7 +18,7 @@ import numpy as np
 from .mesh_topology import Bool, Int64, closed_shells, cut_to_manifold, half_edges, sum_by
 from .scene import Float64
 
-ATTEMPTS = 4
+ATTEMPTS = 6
 # Triangles from which a group is worth a run of its own, the least a run is asked to leave, and the share of a group
 # that a run must remove to be worth it.
 LARGE_GROUP = 1000
@@ -40,9 +40,10 @@ class Reduced:
 
 
 def reduce_groups(positions: Float64, triangles: Int64, group: Int64, weight: Float64, target: int) -> Reduced:
-    """About `target` triangles, or more, shared among the groups by weight, with the lines between groups in place.
+    """About `target` triangles, or more, shared among the groups, with the lines between groups in place.
 
-    positions: (v, 3). triangles: (t, 3), an oriented manifold with border. group: (t,). weight: (t,) non-negative.
+    Half of them by weight, because light comes from there, and half by number of triangles, because a detailed shape
+    needs some whatever its size. positions: (v, 3). triangles: (t, 3), an oriented manifold with border. group: (t,). weight: (t,) non-negative.
     """
     apart, origin = _cut_between_groups(triangles, group, len(positions))
     points = positions[origin]
@@ -73,9 +74,10 @@ def _cut_between_groups(triangles: Int64, group: Int64, vertex_count: int) -> tu
 
 
 def _shares(group: Int64, weight: Float64, target: int) -> list[tuple[Int64, int]]:
-    """(triangles, budget) of each run: large groups alone, small ones together, those below their budget not."""
+    """(triangles, budget) of each run: large groups alone, small ones together, those with little to remove not."""
     size = np.bincount(group)
-    budget = target * sum_by(group, weight, len(size)) / max(float(weight.sum()), float(np.finfo(float).tiny))
+    power = sum_by(group, weight, len(size)) / max(float(weight.sum()), float(np.finfo(float).tiny))
+    budget = target * 0.5 * (power + size / max(len(group), 1))
     reducible = (size > 0) & (budget < WORTHWHILE * size)
     large = reducible & (size >= LARGE_GROUP)
     order = np.argsort(group, kind="stable")
@@ -90,14 +92,18 @@ def _shares(group: Int64, weight: Float64, target: int) -> list[tuple[Int64, int
 def reduce_roughly(positions: Float64, triangles: Int64, target: int) -> Reduced:
     """About `target` triangles, or more, with every border vertex in place, no edge opened and no shell lost.
 
-    positions: (v, 3). triangles: (t, 3) use some of them. After ATTEMPTS faulty results the input is returned.
+    positions: (v, 3). triangles: (t, 3) use some of them. Triangles around faults are kept out of the next attempt;
+    after ATTEMPTS faulty results the input is returned.
     """
-    frozen = np.zeros(len(triangles), bool)
     shell, _ = closed_shells(triangles, len(positions))
+    frozen = np.zeros(len(triangles), bool)
     for _ in range(ATTEMPTS):
+        if frozen.sum() > 0.5 * target:
+            # Faults all over: the library was asked for too much. With more left there are fewer.
+            target, frozen = 4 * target, np.zeros(len(triangles), bool)
         loose = ~frozen
         budget = target - int(frozen.sum())
-        if budget <= 0 or budget >= loose.sum():
+        if budget >= loose.sum():
             break
         reduced = _run(positions, triangles, loose, budget)
         fault = _faults(reduced, triangles, positions)[reduced.vertex_map[triangles]].any(axis=1)

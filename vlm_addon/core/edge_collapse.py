@@ -22,6 +22,7 @@ FREE, LINE, CORNER = 0, 1, 2
 # Share of the edges, cheapest first, that one pass may touch.
 BATCH_SHARE = 0.25
 MINIMUM_BATCH = 64
+SELECTION_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -243,14 +244,28 @@ def _shape(corners: Float64) -> tuple[Float64, Float64, Float64]:
 
 
 def _independent(edges: _Edges, candidate: Int64, triangle_count: int) -> Int64:
-    """Indices of candidates (cheapest first) that share no triangle with a cheaper one."""
+    """Indices of candidates (cheapest first) that share no triangle with each other: a cheaper one goes before.
+
+    In rounds (Luby 1986): who is cheapest around all of its triangles is chosen, its rivals drop out.
+    """
     owner, face = _stars(edges, candidate)
-    first = np.full(triangle_count, len(candidate))
     backwards = np.argsort(-owner, kind="stable")
-    # Of several values for one place NumPy keeps the last: here the smallest owner.
-    first[face[backwards]] = owner[backwards]
-    beaten = first[face] != owner
-    return np.flatnonzero(np.bincount(owner[beaten], minlength=len(candidate)) == 0)
+    owner, face = owner[backwards], face[backwards]
+    chosen = np.zeros(len(candidate), bool)
+    for _ in range(SELECTION_ROUNDS):
+        # Of several values for one place NumPy keeps the last: here the smallest owner.
+        first = np.full(triangle_count, len(candidate))
+        first[face] = owner
+        beaten = np.bincount(owner[first[face] != owner], minlength=len(candidate)) > 0
+        present = np.bincount(owner, minlength=len(candidate)) > 0
+        winner = present & ~beaten
+        chosen |= winner
+        taken = np.zeros(triangle_count, bool)
+        taken[face[winner[owner]]] = True
+        out = np.bincount(owner[taken[face]], minlength=len(candidate)) > 0
+        stays = ~out[owner]
+        owner, face = owner[stays], face[stays]
+    return np.flatnonzero(chosen)
 
 
 def _apply(state: _State, ends: Int64, position: Float64) -> _State:

@@ -22,6 +22,8 @@ FirstHits = Callable[[Float64, Float64, bool], Float64]
 
 ROUNDS = 3
 SWEEPS = 16
+# A plane counts as cleared when less than this share of the wanted depth is missing.
+SOLVED_SHARE = 1e-3
 # Of the thickness, for one side; below one half, so that two sides that move towards each other do not meet.
 THICKNESS_SHARE = 0.4
 # Of the size (square root of the area) of the smallest light around a vertex.
@@ -142,13 +144,18 @@ def _behind_planes(normals: Float64, wanted: Float64, around: Rows) -> Float64:
     angles, and close to the nearest such point elsewhere.
     """
     step = np.zeros((len(around.starts) - 1, 3))
-    valence = around.lengths
+    active = np.arange(len(step))
     for _ in range(SWEEPS):
+        busy = np.zeros(len(active), bool)
+        valence = around.lengths[active]
         for slot in range(int(valence.max(initial=0))):
-            vertex = np.flatnonzero(valence > slot)
+            row = np.flatnonzero(valence > slot)
+            vertex = active[row]
             light = around.values[around.starts[vertex] + slot]
             excess = np.einsum("ij,ij->i", normals[light], step[vertex]) + wanted[light]
             step[vertex] -= np.maximum(excess, 0.0)[:, None] * normals[light]
+            busy[row] |= excess > SOLVED_SHARE * np.abs(wanted[light])
+        active = active[busy]
     return step
 
 

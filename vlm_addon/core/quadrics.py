@@ -13,7 +13,7 @@ from .mesh_topology import HalfEdges, Int64, sum_by
 from .scene import Float64
 
 # Weight of the second moment against the plane quadrics in the cost of a collapse (benchmarks/simplify.py).
-SPREAD_WEIGHT = 0.03
+SPREAD_WEIGHT = 0.003
 # Its weight where only the position is sought: enough to fix flat directions, too little to round off an edge.
 POSITION_WEIGHT = 1e-6
 BORDER_WEIGHT = 3.0

@@ -13,8 +13,10 @@ from .mesh_topology import Bool, Int64
 from .scene import Float64
 from .source_surface import SourceSurface
 
-# Triangles left by the rough reduction for each light asked for: from 8 on the result no longer gets better.
+# Triangles left by the rough reduction for each light asked for: with more the result gets no better (benchmarks/simplify.py),
+# with fewer than some thousands in all, coarse light meshes get worse.
 ROUGH_FACTOR = 8
+ROUGH_LEAST = 4000
 # Share of the budget that the least forms of all shells may take before the weakest shells are left out.
 SHELL_SHARE = 0.75
 LEAST_CLOSED, LEAST_OPEN = 4, 1
@@ -43,11 +45,10 @@ def reduce_surface(surface: SourceSurface, target: int) -> ReducedSurface:
     rows = np.flatnonzero(_strongest_shells(surface, solid, target))
     weight = surface.importance() / np.where(surface.areas > 0, surface.areas, 1.0)
     start = Reduced(surface.positions, surface.triangles[rows], np.arange(len(rows)), np.arange(len(surface.positions)))
-    if len(rows) > 2 * ROUGH_FACTOR * target:
+    rough_target = max(ROUGH_FACTOR * target, ROUGH_LEAST)
+    if len(rows) > 1.5 * rough_target:
         power = (weight * surface.areas)[rows]
-        start = reduce_groups(
-            surface.positions, surface.triangles[rows], surface.group[rows], power, ROUGH_FACTOR * target
-        )
+        start = reduce_groups(surface.positions, surface.triangles[rows], surface.group[rows], power, rough_target)
     left = rows[start.source_triangle]
     used, triangles = np.unique(start.triangles, return_inverse=True)
     triangles = triangles.reshape(-1, 3)

@@ -20,7 +20,8 @@ from .triangle_tree import morton_codes
 
 # Lights before and after a dropped shell on the Z-order curve among which its triangles choose.
 ADOPTION_WINDOW = 16
-PAIRS_PER_BATCH = 1 << 20
+# Some ten candidates each.
+ROWS_PER_BATCH = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ def assign_regions(surface: SourceSurface, reduced: ReducedSurface) -> Regions:
     around = vertex_faces(triangles, len(positions))
     lights = _Lights(positions[triangles], surface.group[source_triangle])
     open_rows = np.flatnonzero((light_of < 0) & ~adopted)
-    for rows in np.array_split(open_rows, max(1, 18 * len(open_rows) // PAIRS_PER_BATCH)):
+    for first in range(0, len(open_rows), ROWS_PER_BATCH):
+        rows = open_rows[first : first + ROWS_PER_BATCH]
         light_of[rows] = _nearest_around(surface, lights, rows, merged[rows], around)
     if adopted.any():
         light_of[adopted] = _adopt(surface, lights, source_triangle, np.flatnonzero(adopted))
@@ -49,36 +51,71 @@ def assign_regions(surface: SourceSurface, reduced: ReducedSurface) -> Regions:
 
 
 class _Lights:
+    """Corners, groups, areas and normals of the lights, and each light in a frame of its own in which it is flat."""
+
     def __init__(self, corners: Float64, group: Int64) -> None:
         self.corners = corners
         self.group = group
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        doubled = np.linalg.norm(normals, axis=1)
+        side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        normal = np.cross(side, other)
+        doubled = np.linalg.norm(normal, axis=1)
         self.areas = 0.5 * doubled
-        self.normals = normals / np.where(doubled > 0, doubled, 1.0)[:, None]
+        self.normals = normal / np.where(doubled > 0, doubled, 1.0)[:, None]
+        length = np.linalg.norm(side, axis=1)
+        x_axis = side / np.where(length > 0, length, 1.0)[:, None]
+        y_axis = np.cross(self.normals, x_axis)
+        self.frames = np.stack([x_axis, y_axis, self.normals], axis=1)
+        zero = np.zeros(len(corners))
+        flat_x = np.stack([zero, length, np.einsum("ij,ij->i", other, x_axis)], axis=1)
+        flat_y = np.stack([zero, zero, np.einsum("ij,ij->i", other, y_axis)], axis=1)
+        self.flat = np.stack([flat_x, flat_y], axis=2)
+
+    def squared_distances(self, points: Float64, light: Int64) -> Float64:
+        """(n,) squared distance from each point (n, 3) to the light beside it, m²."""
+        offset = points - self.corners[light, 0]
+        x, y, height = np.einsum("ikj,ij->ki", self.frames[light], offset)
+        flat = self.flat[light]
+        best = np.full(len(points), np.inf)
+        inside = np.ones(len(points), bool)
+        for corner in range(3):
+            start_x, start_y = flat[:, corner].T
+            side_x, side_y = (flat[:, (corner + 1) % 3] - flat[:, corner]).T
+            dx, dy = x - start_x, y - start_y
+            square = side_x * side_x + side_y * side_y
+            along = np.clip((dx * side_x + dy * side_y) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+            rest_x, rest_y = dx - along * side_x, dy - along * side_y
+            best = np.minimum(best, rest_x * rest_x + rest_y * rest_y)
+            inside &= side_x * dy - side_y * dx >= 0
+        return np.where(inside, 0.0, best) + height * height
 
 
 def _nearest_around(surface: SourceSurface, lights: _Lights, rows: Int64, merged: Int64, around: Rows) -> Int64:
-    pairs = [around.expand(merged[:, corner]) for corner in range(3)]
-    owner, light = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    centre = surface.corners[rows].mean(axis=1)
-    score = squared_distances(centre[owner], lights.corners[light])
-    cosine = np.einsum("ij,ij->i", surface.normals[rows][owner], lights.normals[light])
+    again = merged[:, 1] == merged[:, 0], (merged[:, 2] == merged[:, 0]) | (merged[:, 2] == merged[:, 1])
+    kept = np.arange(len(rows)), np.flatnonzero(~again[0]), np.flatnonzero(~again[1])
+    pairs = [around.expand(merged[part, corner]) for corner, part in enumerate(kept)]
+    owner = np.concatenate([part[pair[0]] for part, pair in zip(kept, pairs, strict=True)])
+    light = np.concatenate([pair[1] for pair in pairs])
+    centre = surface.positions[surface.triangles[rows]].mean(axis=1)
+    score = lights.squared_distances(centre[owner], light)
+    cosine = np.einsum("ij,ij->i", surface.normals[rows[owner]], lights.normals[light])
     score += (1.0 - cosine) * lights.areas[light]
-    score += np.where(surface.group[rows][owner] == lights.group[light], 0.0, np.inf)
+    score += np.where(surface.group[rows[owner]] == lights.group[light], 0.0, np.inf)
     return _least(score, owner, light, len(rows))
 
 
 def _least(score: Float64, owner: Int64, choice: Int64, count: int) -> Int64:
     """The choice of least score of each owner; of the first where all scores are infinite."""
-    order = np.lexsort([score, owner])
-    first = np.searchsorted(owner[order], np.arange(count))
-    return choice[order[first]]
+    # Owners come in a few ascending runs, which the stable sort merges in one go.
+    order = np.argsort(owner, kind="stable")
+    owner, score = owner[order], score[order]
+    starts = np.searchsorted(owner, np.arange(count))
+    best = np.flatnonzero(score == np.minimum.reduceat(score, starts)[owner])
+    return choice[order[best[np.searchsorted(owner[best], np.arange(count))]]]
 
 
 def _adopt(surface: SourceSurface, lights: _Lights, source_triangle: Int64, rows: Int64) -> Int64:
     """A light near each row's shell: of the same motion and tag if there is one near, and rather facing alike."""
-    centre = surface.corners[rows].mean(axis=1)
+    centre = surface.positions[surface.triangles[rows]].mean(axis=1)
     _, shell = np.unique(surface.shell[rows], return_inverse=True)
     members = rows_by_key(shell, int(shell.max()) + 1)
     middle = np.stack([sum_by(shell, centre[:, axis], len(members.lengths)) for axis in range(3)], axis=1)
@@ -89,11 +126,12 @@ def _adopt(surface: SourceSurface, lights: _Lights, source_triangle: Int64, rows
     window = np.arange(-ADOPTION_WINDOW, ADOPTION_WINDOW)
     near = order[np.clip(place[:, None] + window, 0, len(order) - 1)][shell]
     chosen = np.empty(len(rows), np.int64)
-    for part in np.array_split(np.arange(len(rows)), max(1, near.size // PAIRS_PER_BATCH)):
+    for first in range(0, len(rows), ROWS_PER_BATCH):
+        part = np.arange(first, min(first + ROWS_PER_BATCH, len(rows)))
         light = near[part]
         owner = np.repeat(np.arange(len(part)), light.shape[1])
         flat = light.ravel()
-        score = squared_distances(centre[part][owner], lights.corners[flat])
+        score = lights.squared_distances(centre[part][owner], flat)
         cosine = np.einsum("ij,ij->i", surface.normals[rows[part]][owner], lights.normals[flat])
         score = score * (2.0 - cosine) + surface.diagonal**2 * (
             (surface.dynamic[rows[part]][owner] != surface.dynamic[source_triangle[flat]]).astype(float)
@@ -101,23 +139,3 @@ def _adopt(surface: SourceSurface, lights: _Lights, source_triangle: Int64, rows
         )
         chosen[part] = _least(score, owner, flat, len(part))
     return chosen
-
-
-def squared_distances(points: Float64, corners: Float64) -> Float64:
-    """(n,) squared distance from each point (n, 3) to its triangle (n, 3, 3)."""
-    best = np.full(len(points), np.inf)
-    inside = np.ones(len(points), bool)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    for corner in range(3):
-        start = corners[:, corner]
-        side = corners[:, (corner + 1) % 3] - start
-        offset = points - start
-        length2 = np.einsum("ij,ij->i", side, side)
-        along = np.einsum("ij,ij->i", offset, side) / np.where(length2 > 0, length2, 1.0)
-        rest = offset - np.clip(along, 0.0, 1.0)[:, None] * side
-        best = np.minimum(best, np.einsum("ij,ij->i", rest, rest))
-        inside &= np.einsum("ij,ij->i", np.cross(side, offset), normal) >= 0
-    square = np.einsum("ij,ij->i", normal, normal)
-    height = np.einsum("ij,ij->i", points - corners[:, 0], normal)
-    plane = height**2 / np.where(square > 0, square, 1.0)
-    return np.where(inside & (square > 0), plane, best)
