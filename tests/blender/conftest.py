@@ -93,7 +93,8 @@ def make_material():
 
     def make(name="Material", node_type="ShaderNodeBsdfPrincipled"):
         material = bpy.data.materials.new(name)
-        material.use_nodes = True
+        if bpy.app.version < (5, 0):
+            material.use_nodes = True
         nodes = material.node_tree.nodes
         nodes.clear()
         output = nodes.new("ShaderNodeOutputMaterial")

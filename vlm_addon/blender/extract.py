@@ -14,12 +14,18 @@ from .color_space import working_to_rec709
 from .evaluation import evaluate
 from .lamps import read_camera, read_light
 from .materials import FindingList, MaterialTable
-from .mesh_extraction import SURFACE_TYPES, MeshExtractor
+from .mesh_extraction import MeshExtractor
 from .names import is_light_mesh
 from .world import read_world
 
-IGNORED_TYPES = ("ARMATURE", "EMPTY", "LATTICE", "SPEAKER", "CAMERA", "LIGHT_PROBE")
-"""Object types that no renderer draws."""
+SURFACE_TYPES = ("CURVE", "SURFACE", "FONT", "META")
+"""Object types that Blender turns into meshes, which it presents beside them as instances."""
+
+IGNORED_TYPES = ("ARMATURE", "EMPTY", "LATTICE", "SPEAKER", "CAMERA", "LIGHT_PROBE", *SURFACE_TYPES)
+"""Object types that no renderer draws itself."""
+
+UNUSED_ID = 2**31 - 1
+"""What fills the persistent id of an instance up to its fixed length."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +128,7 @@ class _Extraction:
             )
             if light is not None:
                 lights.append(light)
-        elif blender_object.type in SURFACE_TYPES:
+        elif blender_object.type == "MESH":
             if self._chosen(instance):
                 meshes += self._meshes.meshes(instance, instance_name(instance), _matrix(instance))
         elif blender_object.type not in IGNORED_TYPES:
@@ -156,7 +162,10 @@ def _matrix(instance: Any) -> Float64:
 
 def instance_name(instance: Any) -> str:
     """Name of the object, or of instancer and object with the instance's own id."""
-    if not instance.is_instance or instance.parent is None:
-        return str(instance.object.name)
-    numbers = [str(number) for number in instance.persistent_id if number != 2**31 - 1]
-    return f"{instance.parent.name}/{instance.object.name}/{'.'.join(reversed(numbers))}"
+    name, parent = str(instance.object.name), instance.parent
+    if not instance.is_instance or parent is None:
+        return name
+    numbers = [str(number) for number in instance.persistent_id if number != UNUSED_ID]
+    if parent.type in SURFACE_TYPES and parent.name == name and numbers == ["0"]:
+        return name
+    return f"{parent.name}/{name}/{'.'.join(reversed(numbers))}"

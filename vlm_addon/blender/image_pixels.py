@@ -37,10 +37,11 @@ def image_pixels(
     stored = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(stored)
     pixels = _four_channels(stored.reshape(height, width, image.channels))
+    pixels = _with_alpha(pixels, image, straight_alpha)
     space = image.colorspace_settings.name
     if space not in RAW_SPACES:
         pixels[..., :3] = _linear(pixels[..., :3], image, space, to_rec709, report)
-    return _with_alpha(pixels, image, straight_alpha)
+    return pixels
 
 
 def _four_channels(stored: Float32) -> Float32:
@@ -77,7 +78,8 @@ def _with_alpha(pixels: Float32, image: Any, straight: bool) -> Float32:
         return pixels
     if mode == "CHANNEL_PACKED":
         return pixels
-    # `pixels` of a byte image hold straight alpha, those of a float image premultiplied alpha.
+    # `pixels` of a byte image hold straight alpha, those of a float image premultiplied alpha. Cycles multiplies the
+    # encoded values of byte images.
     if image.is_float and straight:
         alpha = pixels[..., 3:]
         np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)

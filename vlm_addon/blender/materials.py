@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.scene import NO_TEXTURE, Finding, Float64, Material, Texture
 from .color_space import convert
-from .node_graph import node_label, source
+from .node_graph import node_label, node_tree_of, source
 from .node_values import NodeEvaluator
 from .surface_value import IDENTITY_UV, SurfaceValue, UvSource
 from .surfaces import BLACK, DEFAULT_COLOR, Surface, SurfaceReader, diffuse_surface
@@ -66,9 +66,10 @@ class MaterialTable:
 
     def _surface(self, material: Any) -> Surface:
         owner = f"material {material.name!r}"
-        if not material.use_nodes or material.node_tree is None:
+        tree = node_tree_of(material)
+        if tree is None:
             return diffuse_surface(convert(np.array(material.diffuse_color[:3], np.float32), self._to_rec709))
-        output = material.node_tree.get_output_node("CYCLES")
+        output = tree.get_output_node("CYCLES")
         if output is None:
             self._report(owner, "it has no output node", "it is black, as in Cycles")
             return diffuse_surface(BLACK)

@@ -17,9 +17,6 @@ from .names import TAG_PROPERTY
 from .surface_value import IDENTITY_UV
 from .triangle_averages import TextureAverager, triangle_averages
 
-SURFACE_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
-"""Object types that Blender turns into meshes."""
-
 RAY_VISIBILITY = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_shadow")
 DEGENERATE_RATIO = 1e-12
 
@@ -63,7 +60,7 @@ class MeshExtractor:
         blender_object = instance.object
         subject = f"object {blender_object.name!r}"
         carries = blender_object.is_instancer or len(blender_object.particle_systems)
-        if blender_object.type == "MESH" and len(local.positions) and not carries and not instance.is_instance:
+        if len(local.positions) and not carries and not instance.is_instance:
             problem = f"its mesh has {len(local.positions)} vertices but no faces"
             raise InvalidInput(subject, problem, "add faces, delete it or disable it in renders")
         if not carries:

@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import bpy
+
 # A file can hold links that Blender shows as invalid; a walk longer than this is one that never ends.
 MAX_STEPS = 1000
 
@@ -77,6 +79,13 @@ def _through(output: Any, groups: tuple[Any, ...]) -> tuple[Any, tuple[Any, ...]
 
 def _by_identifier(sockets: Any, identifier: str) -> Any:
     return next((socket for socket in sockets if socket.identifier == identifier), None)
+
+
+def node_tree_of(owner: Any) -> Any | None:
+    """The node tree that a material or world shows, None where it shows its plain colour (before 5.0)."""
+    if bpy.app.version < (5, 0) and not owner.use_nodes:
+        return None
+    return owner.node_tree
 
 
 def node_label(owner: str, node: Any) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .color_space import convert
 from .materials import FindingList
-from .node_graph import node_label, source
+from .node_graph import node_label, node_tree_of, source
 from .node_values import NodeEvaluator
 
 
@@ -25,10 +25,11 @@ def read_world(world: Any | None, evaluator: NodeEvaluator, report: FindingList)
 
 
 def _radiance(world: Any, owner: str, evaluator: NodeEvaluator, report: FindingList) -> tuple[float, float, float]:
-    if world.node_tree is None or not world.use_nodes:
+    tree = node_tree_of(world)
+    if tree is None:
         red, green, blue = convert(np.array(world.color, np.float32), evaluator.to_rec709).tolist()
         return red, green, blue
-    output = world.node_tree.get_output_node("CYCLES")
+    output = tree.get_output_node("CYCLES")
     if output is None:
         return 0.0, 0.0, 0.0
     if output.inputs["Volume"].is_linked:
