@@ -111,7 +111,46 @@ MATERIAL = GpuStruct(
 )
 """core.scene.Material; flags: the MATERIAL_* bits of CONSTANTS."""
 
-STRUCTS: dict[str, GpuStruct] = {struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL)}
+LAMP = GpuStruct(
+    "Lamp",
+    (
+        ("vec3", "position"),
+        ("int", "kind"),
+        ("vec3", "sample_position"),
+        ("float", "radius"),
+        ("vec3", "intensity"),
+        ("float", "falloff_radius_squared"),
+        ("vec3", "x_axis"),
+        ("float", "spot_cos_half"),
+        ("vec3", "y_axis"),
+        ("float", "spot_sharpness"),
+        ("vec3", "z_axis"),
+        ("int", "corner_count"),
+        ("vec2", "spot_scale"),
+        ("float", "cell_area"),
+        ("float", "cell_radius"),
+        ("vec4", "corners_01"),
+        ("vec4", "corners_23"),
+        ("vec4", "corners_45"),
+        ("vec4", "corners_67"),
+        ("vec2", "shadow_extent"),
+        ("vec2", "shadow_centre"),
+        ("float", "shadow_near"),
+        ("float", "shadow_range"),
+        ("int", "shadow_kind"),
+        ("float", "sample_weight"),
+    ),
+)
+"""One sample of a lamp and the frame of its shadow map; filled by render/lamp_records.py, read by lib/lights.glsl.
+
+position: m from the local origin, for LAMP_SUN the unit vector towards it; sample_position likewise, where the shadows
+come from. radius: m, for LAMP_SUN the sine of half its angle. intensity: W/sr; LAMP_SUN irradiance, LAMP_AREA
+radiosity of its cell over the cell's share, W/m². corners: pairs of (x, y) on an area lamp, m from `position`, counter-
+clockwise seen from its shining side. shadow_extent: tangent of half the field of view, for SHADOW_PARALLEL half the
+size in m. shadow_near: m, nearest distance in a perspective map; for SHADOW_PARALLEL lowest height along z_axis.
+"""
+
+STRUCTS: dict[str, GpuStruct] = {struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL, LAMP)}
 """What `#include "gpu_layout/Name"` finds."""
 
 CONSTANTS: dict[str, int | float] = {
@@ -123,6 +162,7 @@ CONSTANTS: dict[str, int | float] = {
     "LAMP_BINDING": 4,
     "SOURCE_SAMPLE_BINDING": 5,
     "RESULT_BINDING": 6,
+    "SOURCE_LIGHT_BINDING": 7,
     # texture units of a material
     "BASE_COLOR_UNIT": 0,
     "ALPHA_UNIT": 1,
@@ -138,11 +178,23 @@ CONSTANTS: dict[str, int | float] = {
     "GBUFFER_EMISSION_UNIT": 4,
     "GBUFFER_IDS_UNIT": 5,
     "FIRST_FREE_UNIT": 6,
+    # texture units of the passes that light surfaces
+    "SHADOW_MAP_UNIT": 8,
+    "ALBEDO_TABLE_UNIT": 9,
     # bits of Material.flags; a texture's bit is 1 << its unit
     "MATERIAL_PRINCIPLED": 1 << 8,
     "MATERIAL_CORNER_COLOR": 1 << 9,
     # models in the G-buffer's id image
     "MODEL_DIFFUSE": 0,
     "MODEL_PRINCIPLED": 1,
+    # Lamp.kind and Lamp.shadow_kind
+    "LAMP_POINT": 0,
+    "LAMP_SPOT": 1,
+    "LAMP_SUN": 2,
+    "LAMP_AREA": 3,
+    "SHADOW_NONE": 0,
+    "SHADOW_CUBE": 1,
+    "SHADOW_CONE": 2,
+    "SHADOW_PARALLEL": 3,
 }
 """Numbers that Python and GLSL share; every shader sees them as `#define`s."""

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Share of a lamp's sample point that a surface point sees, from a map of nearness.
+//
+// The map holds near / distance along the face's axis, or the height along a sun's direction: larger is nearer, 0 is
+// empty. Both are linear over the map for a plane, so the receiver's own plane is known exactly at each texel: it
+// cannot shadow itself, and no absolute offset is needed.
+#ifndef LIB_SHADOW
+#define LIB_SHADOW
+#include "gpu_layout/Lamp"
+
+// Slack in depth, in texels: against the receiver's plane, and against the receiver itself. The second lets a wall
+// that rises next to the receiver pass within the filter's footprint.
+#define SHADOW_PLANE_SLACK 0.25
+#define SHADOW_POINT_SLACK 1.0
+// Tiles of a cube's six faces in the map: +x -x +y / -y +z -z.
+#define SHADOW_CUBE_TILES vec2(3.0, 2.0)
+
+struct ShadowPoint {
+    vec3 position;  // along a face's two axes and away from the lamp; for SHADOW_PARALLEL up towards the sun
+    vec3 normal;    // likewise
+    vec2 tile;      // of the face in the map
+};
+
+// Position and normal in the frame of the face that sees the point.
+ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
+    mat3 axes = mat3(lamp.x_axis, lamp.y_axis, lamp.z_axis);
+    vec3 m = n * axes;
+    if (lamp.shadow_kind == SHADOW_PARALLEL) {
+        return ShadowPoint(p * axes, m, vec2(0.0));
+    }
+    vec3 q = (p - lamp.sample_position) * axes;
+    const vec3 flip = vec3(1.0, 1.0, -1.0);
+    if (lamp.shadow_kind == SHADOW_CONE) {
+        return ShadowPoint(q * flip, m * flip, vec2(0.0));
+    }
+    vec3 size = abs(q);
+    int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    q = axis == 0 ? q.yzx : axis == 1 ? q.zxy : q;
+    m = axis == 0 ? m.yzx : axis == 1 ? m.zxy : m;
+    bool negative = q.z < 0.0;
+    int face = 2 * axis + int(negative);
+    return ShadowPoint(negative ? q * flip : q, negative ? m * flip : m, vec2(float(face % 3), float(face / 3)));
+}
+
+// Share in [0, 1] of a texel's area around p in which nothing stands before the receiver's plane.
+// p: m from the local origin; n: unit geometric normal on the lit side. map: of `lamp`, in texels without filter.
+float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n) {
+    if (lamp.shadow_kind == SHADOW_NONE) {
+        return 1.0;
+    }
+    bool parallel = lamp.shadow_kind == SHADOW_PARALLEL;
+    vec3 to_lamp = lamp.kind == LAMP_SUN ? lamp.sample_position : lamp.sample_position - p;
+    if (dot(n, to_lamp) <= 0.0) {
+        return 0.0;
+    }
+    ShadowPoint receiver = shadow_point(lamp, p, n);
+    vec2 tiles = lamp.shadow_kind == SHADOW_CUBE ? SHADOW_CUBE_TILES : vec2(1.0);
+    vec2 map_size = vec2(textureSize(map, 0));
+    vec2 resolution = map_size / tiles;
+    vec2 texel = 2.0 * lamp.shadow_extent / resolution;
+
+    vec2 uv;
+    vec2 gradient;      // of the plane's nearness, per unit of uv
+    float nearness;
+    float slack;        // of nearness, per texel of depth
+    vec3 q = receiver.position;
+    if (parallel) {
+        uv = q.xy - lamp.shadow_centre;
+        nearness = (q.z - lamp.shadow_near) / lamp.shadow_range;
+        gradient = -receiver.normal.xy / (max(receiver.normal.z, 1e-6) * lamp.shadow_range);
+        slack = max(texel.x, texel.y) / lamp.shadow_range;
+    } else {
+        uv = q.xy / q.z;
+        nearness = lamp.shadow_near / q.z;
+        gradient = lamp.shadow_near * receiver.normal.xy / min(dot(receiver.normal, q), -1e-6 * q.z);
+        slack = max(texel.x, texel.y) * nearness;
+    }
+    vec2 place = (uv / lamp.shadow_extent * 0.5 + 0.5) * resolution;
+    vec2 corner = clamp(floor(place - 0.5), vec2(0.0), resolution - 2.0);
+    vec2 fraction = clamp(place - 0.5 - corner, 0.0, 1.0);
+    // Order of a gather: (0, 1), (1, 1), (1, 0), (0, 0).
+    vec4 stored = textureGather(map, (receiver.tile * resolution + corner + 1.0) / map_size);
+    vec2 to_corner = (corner + 0.5 - place) * texel;
+    vec2 step_u = gradient * texel;
+    float at_corner = nearness + dot(gradient, to_corner);
+    vec4 plane = at_corner + vec4(step_u.y, step_u.x + step_u.y, step_u.x, 0.0);
+    vec4 limit = max(plane + SHADOW_PLANE_SLACK * slack, nearness + SHADOW_POINT_SLACK * slack);
+    vec4 lit = vec4(lessThanEqual(stored, limit));
+    vec2 row = mix(lit.wx, lit.zy, fraction.x);
+    return mix(row.x, row.y, fraction.y);
+}
+#endif

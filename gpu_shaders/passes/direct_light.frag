@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light of one sample of one lamp that each pixel sends to the eye, added to that of the other lamps.
+#include "passes/gbuffer_samplers.glsl"
+#include "passes/reflectance.glsl"
+#include "lib/lights.glsl"
+#include "lib/shadow.glsl"
+
+layout(std430, binding = LAMP_BINDING) readonly buffer Lamps { Lamp lamps[]; };
+layout(binding = SHADOW_MAP_UNIT) uniform sampler2D shadow_map;
+
+uniform vec3 camera_position;   // m, from the local origin
+uniform vec3 camera_backward;   // unit
+uniform bool is_orthographic;
+
+layout(location = 0) out vec4 out_radiance; // W/(m² sr)
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    out_radiance = vec4(0.0);
+    vec3 geometric_normal = texelFetch(gbuffer_geometric_normal, pixel, 0).xyz;
+    if (!shows_geometry(geometric_normal)) {
+        return;
+    }
+    Lamp lamp = lamps[0];
+    vec3 position = texelFetch(gbuffer_position, pixel, 0).xyz;
+    vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
+    vec3 irradiance = lamp_irradiance(lamp, position, normal);
+    LampRay ray = lamp_ray(lamp, position);
+    vec3 specular_irradiance = dot(normal, ray.direction) > 0.0 ? ray.irradiance : vec3(0.0);
+    if (max(max(irradiance.r, irradiance.g), irradiance.b) <= 0.0 && specular_irradiance == vec3(0.0)) {
+        return;
+    }
+    float lit = lit_share(shadow_map, lamp, position, geometric_normal);
+    if (lit <= 0.0) {
+        return;
+    }
+    Surface surface = fetch_surface(pixel);
+    vec3 to_camera = is_orthographic ? camera_backward : normalize(camera_position - position);
+    Reflector reflector = make_reflector(surface, to_camera, albedo_table);
+    vec3 radiance = reflector.diffuse * INVERSE_PI * irradiance
+        + specular_reflection(reflector, normal, ray.direction, to_camera) * specular_irradiance;
+    out_radiance = vec4(lit * radiance, 0.0);
+}

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each lamp sees: maps of nearness that tell which surface points it lights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.lamps import is_soft, lamp_samples
+from ...core.scene import AREA, SPOT, SUN, Float64, Light
+from ..geometry import GpuGeometry
+from ..gpu_layout import CONSTANTS
+from ..lamp_records import lamp_record
+from ..shader_library import ShaderLibrary, set_uniforms
+
+if TYPE_CHECKING:
+    import moderngl
+
+VERTEX, FRAGMENT = "passes/shadow_map.vert", "passes/shadow_map.frag"
+# Above this cone one perspective map wastes most of its texels on the rim.
+WIDEST_CONE = math.radians(120.0)
+# Faces of a cube: index of the axis that looks forward, its sign. The other two axes follow cyclically.
+CUBE_FACES = ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0))
+FRONT_FACE = 5
+CUBE_TILES = (3, 2)
+# A map of one tile has this many times the cube's texels per side: about as many in all.
+SINGLE_TILE_FACTOR = 2
+# Texels around what must be seen, for the filter.
+MARGIN = 2.0
+# Nearest occluder that counts, of the distance to the farthest: no precision depends on it.
+NEAREST = 1e-6
+# Bytes of maps that are kept for all samples of a frame; further lamps are drawn again.
+CACHE_BYTES = 1 << 29
+
+
+@dataclass(frozen=True)
+class ShadowMap:
+    """A lamp's sample and what it sees.
+
+    texture: R32F of nearness, unfiltered. record: (1,) of gpu_layout.LAMP. share: of the lamp that the sample is.
+    """
+
+    texture: moderngl.Texture
+    record: np.ndarray
+    share: float
+
+    def bind(self) -> None:
+        """Binds the map to its texture unit."""
+        self.texture.use(int(CONSTANTS["SHADOW_MAP_UNIT"]))
+
+
+class ShadowMapPass:
+    """Draws maps of nearness for lamps of every kind."""
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
+        """resolution: texels along a cube's face; a map of a single view has twice as many."""
+        self._context = context
+        self._opaque = shaders.program(VERTEX, FRAGMENT)
+        self._shaders = shaders
+        self._resolution = resolution
+        self._empty = self._new_texture((2, 2))
+        context.framebuffer([self._empty]).clear()
+
+    def new_texture(self, light: Light) -> moderngl.Texture:
+        """A texture of the size that maps of `light` need."""
+        return self._new_texture(self.size(light))
+
+    def _new_texture(self, size: tuple[int, int]) -> moderngl.Texture:
+        import moderngl
+
+        texture = self._context.texture(size, 1, dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        texture.repeat_x = texture.repeat_y = False
+        return texture
+
+    def size(self, light: Light) -> tuple[int, int]:
+        """Width and height of the maps of `light`, texels."""
+        if shadow_kind(light) == "SHADOW_CUBE":
+            return CUBE_TILES[0] * self._resolution, CUBE_TILES[1] * self._resolution
+        side = SINGLE_TILE_FACTOR * self._resolution
+        return side, side
+
+    def render(
+        self,
+        geometry: GpuGeometry,
+        light: Light,
+        sample_index: int,
+        sample_count: int,
+        texture: moderngl.Texture | None = None,
+    ) -> ShadowMap:
+        """The map of one of `sample_count` points of `light`, drawn over `texture` if one is given.
+
+        A lamp that casts no shadow, or a scene without triangles, gives an empty map.
+        """
+        samples = lamp_samples(light, sample_count)
+        sample = samples[sample_index % len(samples)]
+        record = lamp_record(light, sample, geometry.origin)
+        if not light.casts_shadow or geometry.triangle_count == 0:
+            return ShadowMap(self._empty, record, sample.share)
+        record["shadow_kind"] = CONSTANTS[shadow_kind(light)]
+        target = texture or self.new_texture(light)
+        framebuffer = self._context.framebuffer([target])
+        framebuffer.clear()
+        for matrix, viewport in self._views(light, record, geometry):
+            framebuffer.viewport = viewport
+            self._draw(framebuffer, geometry, matrix, record, sample_index)
+        return ShadowMap(target, record, sample.share)
+
+    def _draw(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        geometry: GpuGeometry,
+        clip_from_local: Float64,
+        record: np.ndarray,
+        sample_index: int,
+    ) -> None:
+        import moderngl
+
+        framebuffer.use()
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE
+        self._context.blend_equation = moderngl.MAX  # type: ignore[assignment]
+        uniforms = {
+            "clip_from_local": clip_from_local,
+            "is_parallel": int(record["shadow_kind"][0]) == CONSTANTS["SHADOW_PARALLEL"],
+            "shadow_near": float(record["shadow_near"][0]),
+            "sample_index": sample_index,
+        }
+        set_uniforms(self._opaque, uniforms)
+        geometry.draw_opaque(self._opaque)
+        if geometry.has_alpha:
+            program = self._shaders.program(VERTEX, FRAGMENT, {"HAS_ALPHA": True})
+            set_uniforms(program, uniforms)
+            geometry.draw_with_alpha(program)
+        self._context.blend_equation = moderngl.FUNC_ADD  # type: ignore[assignment]
+
+    def _views(
+        self, light: Light, record: np.ndarray, geometry: GpuGeometry
+    ) -> list[tuple[Float64, tuple[int, int, int, int]]]:
+        """Matrix from local to clip space and viewport of each tile; fills the shadow fields of `record`."""
+        corners = _box_corners(geometry.low, geometry.high)
+        axes = np.array([record[name][0] for name in ("x_axis", "y_axis", "z_axis")], np.float64)
+        width, height = self.size(light)
+        if light.kind == SUN:
+            return [(_parallel_view(record, corners @ axes.T, axes, width), (0, 0, width, height))]
+        origin = record["sample_position"][0].astype(np.float64)
+        seen = (corners - origin) @ axes.T
+        near = NEAREST * float(np.linalg.norm(seen, axis=1).max())
+        record["shadow_near"] = near
+        if shadow_kind(light) == "SHADOW_CONE":
+            tangents = math.tan(0.5 * light.spot_angle) * np.array(light.spot_scale) / (1.0 - 2.0 * MARGIN / width)
+            record["shadow_extent"] = tangents
+            return [(_perspective(axes, origin, FRONT_FACE, tangents, near), (0, 0, width, height))]
+        tangents = np.full(2, 1.0 / (1.0 - 2.0 * MARGIN / self._resolution))
+        record["shadow_extent"] = tangents
+        return [
+            (_perspective(axes, origin, face, tangents, near), self._tile(face))
+            for face in range(len(CUBE_FACES))
+            if _may_see(light, face, seen, float(tangents[0]))
+        ]
+
+    def _tile(self, face: int) -> tuple[int, int, int, int]:
+        column, row = face % CUBE_TILES[0], face // CUBE_TILES[0]
+        return column * self._resolution, row * self._resolution, self._resolution, self._resolution
+
+
+def shadow_kind(light: Light) -> str:
+    """Name of the projection of a lamp's map, among gpu_layout.CONSTANTS."""
+    if light.kind == SUN:
+        return "SHADOW_PARALLEL"
+    if light.kind == SPOT and light.spot_angle * max(1.0, *light.spot_scale) <= WIDEST_CONE:
+        return "SHADOW_CONE"
+    return "SHADOW_CUBE"
+
+
+def depends_on_sample(light: Light, geometry: GpuGeometry) -> bool:
+    """Whether each sample of a frame needs another map: soft lamps, and occluders that are let through by chance."""
+    return light.casts_shadow and (is_soft(light) or geometry.has_alpha)
+
+
+def _box_corners(low: Float64, high: Float64) -> Float64:
+    return np.array([[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
+
+
+def _may_see(light: Light, face: int, seen: Float64, tangent: float) -> bool:
+    """Whether a cube's face can hold an occluder: the scene's bounds, in the lamp's frame, reach into its frustum."""
+    axis, sign = CUBE_FACES[face]
+    if light.kind in (AREA, SPOT) and axis == 2 and sign > 0.0:
+        return False
+    forward = sign * seen[:, axis]
+    if (forward <= 0.0).all():
+        return False
+    sides = [seen[:, (axis + 1) % 3], seen[:, (axis + 2) % 3]]
+    return not any((side * way > tangent * forward).all() for side in sides for way in (1.0, -1.0))
+
+
+def _perspective(axes: Float64, origin: Float64, face: int, tangents: Float64, near: float) -> Float64:
+    """Clip matrix of a face with w = distance along its axis, without far plane."""
+    axis, sign = CUBE_FACES[face]
+    right, up, forward = axes[(axis + 1) % 3], axes[(axis + 2) % 3], sign * axes[axis]
+    rows = np.array([right / tangents[0], up / tangents[1], forward, forward])
+    matrix = np.concatenate([rows, -(rows @ origin)[:, None]], axis=1)
+    matrix[2, 3] -= 2.0 * near
+    return matrix
+
+
+def _parallel_view(record: np.ndarray, seen: Float64, axes: Float64, side: int) -> Float64:
+    """Clip matrix that fits the bounds `seen` (8, 3) in the sun's frame; depth grows away from the sun."""
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    centre = 0.5 * (low + high)
+    # A flat or empty extent still gets a size.
+    least = 1e-6 * max(float(np.abs(seen).max()), float((high - low).max()), 1e-30)
+    half = np.maximum(0.5 * (high - low), least) / (1.0 - 2.0 * MARGIN / side)
+    record["shadow_extent"], record["shadow_centre"] = half[:2], centre[:2]
+    record["shadow_near"], record["shadow_range"] = centre[2] - half[2], 2.0 * half[2]
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes / half[:, None]
+    matrix[:3, 3] = -centre / half
+    matrix[2] *= -1.0
+    return matrix
+
+
+class LampShadows:
+    """The maps of a scene's lamps over the samples of a frame: those that never change are drawn once."""
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        geometry: GpuGeometry,
+        lights: Sequence[Light],
+        resolution: int,
+    ) -> None:
+        self.lights = tuple(lights)
+        self._geometry = geometry
+        self._pass = ShadowMapPass(context, shaders, resolution)
+        self._kept: dict[int, ShadowMap] = {}
+        self._kept_bytes = 0
+        self._shared: dict[tuple[int, int], moderngl.Texture] = {}
+
+    def shadow_map(self, lamp_index: int, sample_index: int, sample_count: int) -> ShadowMap:
+        """The map of one sample of a lamp; valid until the next call for another lamp or sample."""
+        light = self.lights[lamp_index]
+        if lamp_index in self._kept:
+            return self._kept[lamp_index]
+        if depends_on_sample(light, self._geometry) or self._kept_bytes >= CACHE_BYTES:
+            return self._pass.render(self._geometry, light, sample_index, sample_count, self._shared_texture(light))
+        shadow_map = self._pass.render(self._geometry, light, sample_index, sample_count)
+        width, height = shadow_map.texture.size
+        self._kept_bytes += 4 * width * height
+        if not is_soft(light):
+            self._kept[lamp_index] = shadow_map
+        return shadow_map
+
+    def samples_of(self, lamp_index: int, most: int) -> int:
+        """How many samples of a lamp differ, at most `most`."""
+        return most if is_soft(self.lights[lamp_index]) else 1
+
+    def _shared_texture(self, light: Light) -> moderngl.Texture:
+        fresh = self._pass.size(light)
+        if fresh not in self._shared:
+            self._shared[fresh] = self._pass.new_texture(light)
+        return self._shared[fresh]
