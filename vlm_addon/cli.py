@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .core.errors import InvalidInput, VlmError
+from .core.errors import VlmError
 
 EXIT_DONE, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_FINDINGS = 0, 1, 2, 3
 
@@ -65,7 +65,9 @@ def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     text = "one picture by one technique"
-    command = _command(commands, "render", text, "vlm render hall_vlm.blend --technique vlm --out hall.exr --samples 64")
+    command = _command(
+        commands, "render", text, "vlm render hall_vlm.blend --technique vlm --out hall.exr --samples 64"
+    )
     _scene_options(command)
     command.add_argument("--technique", required=True, metavar="NAME", help="one of `vlm techniques`")
     command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of the technique")
@@ -101,7 +103,9 @@ def _command(
 def _scene_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("scene", type=Path, metavar="SCENE.blend", help="opened by this command, never changed")
     command.add_argument("--frame", type=int, metavar="N", help="frame; the file's current one without")
-    command.add_argument("--scene", dest="scene_name", metavar="NAME", help="scene of the file; its current one without")
+    command.add_argument(
+        "--scene", dest="scene_name", metavar="NAME", help="scene of the file; its current one without"
+    )
     command.add_argument("--view-layer", metavar="NAME", help="view layer; the scene's first without")
     command.add_argument("--camera", metavar="NAME", help="camera object; the scene's without")
     command.add_argument("--viewport-levels", action="store_true", help="modifiers as in the viewport")
@@ -115,24 +119,27 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _bake(arguments: argparse.Namespace) -> int:
-    from .blender import commands
+    from .blender.commands import bake_command
 
-    return commands.bake(arguments)
+    bake_command(arguments)
+    return EXIT_DONE
 
 
 def _render(arguments: argparse.Namespace) -> int:
-    from .blender import commands
+    from .blender.commands import render_command
 
-    return commands.render(arguments)
+    render_command(arguments)
+    return EXIT_DONE
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from .blender import commands
+    from .blender.commands import check_command
 
-    return EXIT_FINDINGS if commands.check(arguments) else EXIT_DONE
+    return EXIT_FINDINGS if check_command(arguments) else EXIT_DONE
 
 
 def _techniques(arguments: argparse.Namespace) -> int:
-    from .blender import commands
+    from .blender.commands import techniques_command
 
-    return commands.techniques(arguments)
+    techniques_command(arguments)
+    return EXIT_DONE

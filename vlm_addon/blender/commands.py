@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The commands of the command line on scenes: open, extract, work, write. Each returns plain counts or findings."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..bake import Bake, bake
+from ..core.errors import InvalidInput
+from ..core.light_mesh import empty_light_mesh
+from ..core.progress import Progress
+from ..core.scene import Finding
+from ..core.settings import describe, from_mapping
+from ..core.simplify import SimplifySettings
+from ..core.validate import check_light_mesh
+from ..render.frame_types import Frame, RenderSettings
+from ..render.technique import technique_list
+from ..terminal import TerminalProgress, table
+from .authoring import NAME
+from .availability import light_mesh_objects
+from .extract import ExtractOptions, require_camera, require_lights
+from .image_io import require_format, write_image
+from .light_mesh_io import Extraction, extract
+from .names import SOURCES_PROPERTY
+from .render_process import KEPT
+from .scene_file import OpenedScene, atomic_output, open_scene, require_writable, save_blend
+from .write_back import write_light_mesh
+
+
+def bake_command(arguments: Namespace) -> None:
+    """`bake`: writes the scene with its light mesh and a report."""
+    outputs = [path for path in (arguments.save, arguments.json) if path is not None]
+    if not outputs:
+        raise InvalidInput("bake", "nothing would be written", "name --save OUT.blend, --json REPORT.json or both")
+    settings = _simplify_settings(arguments.triangles)
+    _require_apart(arguments.scene, outputs)
+    opened, found = _open(arguments)
+    kept = _kept_light_meshes()
+    anew = found.light_mesh is None or (settings is not None and not kept)
+    made = bake(found.snapshot, None if anew else found.light_mesh, settings if anew else None, TerminalProgress())
+    if anew:
+        for replaced in light_mesh_objects(bpy.context.scene):
+            bpy.data.objects.remove(replaced)
+        write_light_mesh(made.light_mesh, NAME, [mesh.name for mesh in found.snapshot.meshes])
+    findings = made.findings
+    if settings is not None and kept:
+        problem = f"the scene has light meshes drawn by hand ({', '.join(kept)}), so --triangles made no other"
+        findings = (
+            Finding(f"scene {found.snapshot.name!r}", problem, "delete them from the scene to have one made"),
+            *findings,
+        )
+    if arguments.save is not None:
+        save_blend(arguments.save, opened)
+    _print_findings(findings)
+    print(_bake_summary(made))
+    write_json(arguments.json, _scene_report(opened) | made.report() | {"findings": [str(f) for f in findings]})
+
+
+def _simplify_settings(triangles: int | None) -> SimplifySettings | None:
+    if triangles is None:
+        return None
+    if triangles < 1:
+        raise InvalidInput("--triangles", f"{triangles} lights cannot be made", "ask for at least 1")
+    return from_mapping(SimplifySettings, {"target_triangles": triangles}, "bake")
+
+
+def _kept_light_meshes() -> list[str]:
+    """Names of the scene's light meshes that were not made by simplification."""
+    return [thing.name for thing in light_mesh_objects(bpy.context.scene) if SOURCES_PROPERTY not in thing]
+
+
+def _bake_summary(made: Bake) -> str:
+    if made.creation is None:
+        return f"kept the scene's {len(made.light_mesh)} virtual lights"
+    seconds = sum(ms for _, ms in made.creation.milliseconds) / 1000.0
+    return (
+        f"made {len(made.light_mesh)} virtual lights from {made.creation.source_triangles} triangles in {seconds:.2f} s"
+    )
+
+
+def render_command(arguments: Namespace) -> None:
+    """`render`: writes one picture, its buffers and a report."""
+    settings = _setting_texts(arguments.set)
+    require_format(arguments.out)
+    _require_apart(arguments.scene, [path for path in (arguments.out, arguments.json) if path is not None])
+    opened, found = _open(arguments)
+    require_camera(found.snapshot)
+    require_lights(found.snapshot)
+    width, height = arguments.size or _scene_size()
+    frame_settings = RenderSettings(
+        width,
+        height,
+        technique=arguments.technique,
+        technique_settings=settings,
+        samples=arguments.samples,
+        buffers=arguments.buffers is not None,
+    )
+    frame = _rendered(found, frame_settings, TerminalProgress())
+    write_image(arguments.out, frame.images["combined"], view=arguments.view)
+    if arguments.buffers is not None:
+        _write_buffers(arguments.buffers, frame)
+    _print_findings((*frame.findings, *found.snapshot.findings))
+    print(_timing_table(frame))
+    write_json(arguments.json, _scene_report(opened) | _frame_report(frame, frame_settings, found.snapshot.findings))
+
+
+def _setting_texts(pairs: Sequence[str]) -> dict[str, str]:
+    texts = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not (name and equals):
+            raise InvalidInput(f"--set {pair!r}", "it is not KEY=VALUE", "write it as in --set samples=64")
+        texts[name] = value
+    return texts
+
+
+def _scene_size() -> tuple[int, int]:
+    render = bpy.context.scene.render
+    share = render.resolution_percentage / 100.0
+    return max(int(render.resolution_x * share), 1), max(int(render.resolution_y * share), 1)
+
+
+def _rendered(found: Extraction, settings: RenderSettings, progress: Progress) -> Frame:
+    try:
+        return KEPT.render(found.snapshot, found.light_mesh, settings, progress)
+    finally:
+        KEPT.close()
+
+
+def _write_buffers(folder: Path, frame: Frame) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InvalidInput(str(folder), f"it cannot be made ({error.strerror})", "give another folder") from error
+    for name, image in frame.images.items():
+        write_image(folder / f"{name}.exr", image)
+
+
+def _timing_table(frame: Frame) -> str:
+    total = sum(ms for _, ms in frame.timings)
+    rows = [(name, f"{ms:.1f}") for name, ms in frame.timings]
+    return table((f"pass ({frame.device}, {frame.timer})", "ms"), [*rows, ("all passes", f"{total:.1f}")])
+
+
+def _frame_report(frame: Frame, settings: RenderSettings, findings: tuple[Finding, ...]) -> dict[str, Any]:
+    return {
+        "settings": asdict(settings),
+        "device": frame.device,
+        "timer": frame.timer,
+        "milliseconds": [list(entry) for entry in frame.timings],
+        "counters": frame.counters,
+        "findings": [str(finding) for finding in (*frame.findings, *findings)],
+    }
+
+
+def check_command(arguments: Namespace) -> int:
+    """`check`: prints what is wrong with the light mesh; returns how many findings there are.
+
+    What extraction approximates is printed and reported as notes, which do not count.
+    """
+    opened, found = _open(arguments)
+    light_mesh = found.light_mesh if found.light_mesh is not None else empty_light_mesh()
+    findings = check_light_mesh(light_mesh, found.snapshot.meshes)
+    for finding in findings:
+        print(f"finding: {finding}")
+    for note in found.snapshot.findings:
+        print(f"note: {note}")
+    print(f"{len(light_mesh)} virtual lights, {len(findings)} findings")
+    report = {
+        "lights": len(light_mesh),
+        "findings": [asdict(finding) for finding in findings],
+        "notes": [asdict(note) for note in found.snapshot.findings],
+    }
+    write_json(arguments.json, _scene_report(opened) | report)
+    return len(findings)
+
+
+def techniques_command(arguments: Namespace) -> None:
+    """`techniques`: prints each technique with its settings, defaults, units and sources."""
+    listed = []
+    for technique in technique_list():
+        print(f"{technique.name}: {technique.description}")
+        settings = list(describe(technique.settings))
+        for setting in settings:
+            span = f"{setting.low} to {setting.high} {setting.unit}".strip()
+            source = f" [{setting.source}]" if setting.source else ""
+            print(f"  {setting.name}={setting.default}  ({span}) {setting.text}{source}")
+        listed.append(
+            {
+                "name": technique.name,
+                "label": technique.label,
+                "description": technique.description,
+                "needs_light_mesh": technique.needs_light_mesh,
+                "settings": [asdict(setting) | {"type": setting.type.__name__} for setting in settings],
+            }
+        )
+    if arguments.json is not None:
+        require_writable(arguments.json)
+    write_json(arguments.json, {"techniques": listed})
+
+
+def _open(arguments: Namespace) -> tuple[OpenedScene, Extraction]:
+    opened = open_scene(arguments.scene, arguments.frame, arguments.scene_name, arguments.view_layer, arguments.camera)
+    return opened, extract(ExtractOptions(viewport_levels=arguments.viewport_levels))
+
+
+def _require_apart(scene: Path, outputs: Sequence[Path]) -> None:
+    """Raises InvalidInput where an output cannot be written or would replace the scene it is made from."""
+    for path in outputs:
+        require_writable(path)
+        if path.exists() and scene.exists() and path.samefile(scene):
+            raise InvalidInput(str(path), "it is the scene itself", "give another path; the source is never changed")
+
+
+def _scene_report(opened: OpenedScene) -> dict[str, Any]:
+    return {
+        "scene_file": opened.path.name,
+        "scene": opened.scene,
+        "view_layer": opened.view_layer,
+        "frame": opened.frame,
+        "camera": opened.camera,
+    }
+
+
+def _print_findings(findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        print(f"note: {finding}")
+
+
+def write_json(path: Path | None, report: dict[str, Any]) -> None:
+    """Writes a report that appears whole or not at all; nothing without a path."""
+    if path is None:
+        return
+    with atomic_output(path) as temporary:
+        temporary.write_text(json.dumps(report, indent=1) + "\n")
