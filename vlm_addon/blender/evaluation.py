@@ -21,6 +21,9 @@ from .temporary import restored
 
 T = TypeVar("T")
 
+TEMPORARY_PROPERTY = "vlm_temporary"
+"""Marks the camera of a scene that has none."""
+
 ENGINE_ID = "VLM_SNAPSHOT"
 RENDER_HANDLERS = ("render_init", "render_pre", "render_post", "render_complete", "render_cancel", "render_stats")
 
@@ -129,6 +132,7 @@ def _some_camera(scene: Any) -> Iterator[None]:
         return
     data = bpy.data.cameras.new("vlm temporary")
     camera = bpy.data.objects.new("vlm temporary", data)
+    camera[TEMPORARY_PROPERTY] = True
     scene.camera = camera
     try:
         yield

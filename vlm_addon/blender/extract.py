@@ -11,7 +11,7 @@ import numpy as np
 from ..core.errors import InvalidInput
 from ..core.scene import Camera, Float64, Light, Mesh, SceneSnapshot
 from .color_space import working_to_rec709
-from .evaluation import evaluate
+from .evaluation import TEMPORARY_PROPERTY, evaluate
 from .lamps import read_camera, read_light
 from .materials import FindingList, MaterialTable
 from .mesh_extraction import MeshExtractor
@@ -149,7 +149,7 @@ class _Extraction:
 
     def _camera(self, scene: Any) -> Camera | None:
         original = scene.camera.original if scene.camera is not None else None
-        if original is None:
+        if original is None or TEMPORARY_PROPERTY in original:
             return None
         evaluated = original.evaluated_get(self._depsgraph)
         return read_camera(evaluated, np.array(evaluated.matrix_world, np.float64), scene, self._report)

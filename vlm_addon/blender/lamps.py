@@ -91,7 +91,7 @@ def _normalization(lamp: Any, radius: float, size_x: float, size_y: float) -> fl
     if getattr(lamp, "normalize", True):
         return 1.0
     if lamp.type in (POINT, SPOT):
-        return math.pi * radius * radius if radius > 0.0 else 1.0
+        return 4.0 * math.pi * radius * radius if radius > 0.0 else 1.0
     if lamp.type == SUN:
         return math.pi * math.sin(0.5 * lamp.angle) ** 2 if lamp.angle > 0.0 else 1.0
     area = size_x * size_y
