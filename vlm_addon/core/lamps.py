@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,7 @@ _ELLIPSE_CELLS = 64
 _CELL_CORNERS = 8
 # Steps of the bisection that inverts the radius of a lamp's ball: one for each bit of a float64.
 _BISECTIONS = 53
+_ORDERS_TRIED = 256
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _PLASTIC = 1.32471795724474602596
 """Real root of x³ = x + 1."""
@@ -59,6 +61,11 @@ def area_of(light: Light) -> float:
 
 def lamp_samples(light: Light, count: int) -> tuple[LampSample, ...]:
     """`count` points that share the lamp evenly, or a single one for a lamp that casts hard shadows."""
+    samples = _samples_in_rows(light, count)
+    return samples if len(samples) == 1 else tuple(samples[i] for i in _order(count))
+
+
+def _samples_in_rows(light: Light, count: int) -> tuple[LampSample, ...]:
     position = np.array(light.position)
     axes = np.array([light.x_axis, light.y_axis, light.z_axis])
     none = np.zeros((0, 2))
@@ -72,6 +79,29 @@ def lamp_samples(light: Light, count: int) -> tuple[LampSample, ...]:
         directions = _cone_directions(0.5 * light.angle, count) @ axes
         return tuple(LampSample(direction, none, 1.0 / count) for direction in directions)
     return tuple(LampSample(position + offset, none, 1.0 / count) for offset in light.radius * _ball_points(count))
+
+
+@lru_cache(maxsize=64)
+def _order(count: int) -> tuple[int, ...]:
+    """An order of `count` strata in which their places hang least on the index and on its base 2 radical inverse.
+
+    The samples of a frame look at different places in a pixel, by those two; were the lamp's points tied to them,
+    light that varies over the pixel would be weighted by where it comes from.
+    """
+    if count < 3:
+        return tuple(range(count))
+    index = np.arange(count)
+    bits = np.arange(count.bit_length())
+    inverse = ((index[:, None] >> bits) & 1) @ 0.5 ** (bits + 1)
+    x, y, width, height = _strata(count)
+    places = np.stack([x + 0.5 * width, y + 0.5 * height + 1e-9 * index])
+    random = np.random.default_rng(count)
+
+    def tie(order: np.ndarray) -> float:
+        return float(np.abs(np.corrcoef(np.stack([*places[:, order], index, inverse]))[:2, 2:]).max())
+
+    orders = [random.permutation(count) for _ in range(_ORDERS_TRIED)]
+    return tuple(int(i) for i in min(orders, key=tie))
 
 
 def _strata(count: int) -> tuple[Float64, Float64, Float64, Float64]:
