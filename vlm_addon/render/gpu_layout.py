@@ -150,7 +150,15 @@ clockwise seen from its shining side. shadow_extent: tangent of half the field o
 size in m. shadow_near: m, nearest distance in a perspective map; for SHADOW_PARALLEL lowest height along z_axis.
 """
 
-STRUCTS: dict[str, GpuStruct] = {struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL, LAMP)}
+SOURCE_SAMPLE = GpuStruct("SourceSample", (("vec3", "position"), ("float", "weight"), ("vec3", "normal")))
+"""A point on the visible surface where phase one measures irradiance; position in m from the local origin."""
+
+SOURCE_LIGHT = GpuStruct("SourceLight", (("vec3", "reflectance"), ("int", "first_sample"), ("int", "end_sample")))
+"""What phase one needs of a virtual light; reflectance: colour times strength."""
+
+STRUCTS: dict[str, GpuStruct] = {
+    struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL, LAMP, SOURCE_SAMPLE, SOURCE_LIGHT)
+}
 """What `#include "gpu_layout/Name"` finds."""
 
 CONSTANTS: dict[str, int | float] = {

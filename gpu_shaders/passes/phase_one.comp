@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Adds to each virtual light what it reflects of one sample of one lamp (seed 002, 3.2).
+#include "gpu_layout/SourceSample"
+#include "gpu_layout/SourceLight"
+#include "lib/lights.glsl"
+#include "lib/shadow.glsl"
+
+layout(local_size_x = GROUP_SIZE) in;
+
+layout(std430, binding = LAMP_BINDING) readonly buffer Lamps { Lamp lamps[]; };
+layout(std430, binding = SOURCE_SAMPLE_BINDING) readonly buffer SourceSamples { SourceSample source_samples[]; };
+layout(std430, binding = SOURCE_LIGHT_BINDING) readonly buffer SourceLights { SourceLight source_lights[]; };
+layout(std430, binding = RADIOSITY_BINDING) buffer Radiosities { vec4 radiosities[]; }; // W/m², w unused
+layout(binding = SHADOW_MAP_UNIT) uniform sampler2D shadow_map;
+
+uniform float share;        // of the lamp that this sample stands for
+uniform int light_count;
+
+void main() {
+    int index = int(gl_GlobalInvocationID.x);
+    if (index >= light_count) {
+        return;
+    }
+    Lamp lamp = lamps[0];
+    SourceLight light = source_lights[index];
+    vec3 irradiance = vec3(0.0);
+    for (int i = light.first_sample; i < light.end_sample; ++i) {
+        SourceSample source = source_samples[i];
+        vec3 unshadowed = lamp_irradiance(lamp, source.position, source.normal);
+        if (max(max(unshadowed.r, unshadowed.g), unshadowed.b) > 0.0) {
+            irradiance += source.weight * lit_share(shadow_map, lamp, source.position, source.normal) * unshadowed;
+        }
+    }
+    radiosities[index].rgb += share * light.reflectance * irradiance;
+}

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Radiosity of the virtual lights from the lamps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.errors import DeviceError
+from ...core.light_mesh import VirtualLightMesh
+from ...core.progress import Progress, silent, step
+from ...core.scene import Float32, Float64
+from ..gpu_layout import CONSTANTS, LAMP, SOURCE_LIGHT, SOURCE_SAMPLE
+from ..shader_library import ShaderLibrary, set_uniforms
+from .shadow_map import LampShadows
+
+if TYPE_CHECKING:
+    import moderngl
+
+GROUP_SIZE = 64
+
+
+class PhaseOnePass:
+    """Irradiance at the source samples of each virtual light, turned into radiosity (seed 002, 3.2)."""
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
+        self._context = context
+        self._shader = shaders.compute("passes/phase_one.comp", {"GROUP_SIZE": GROUP_SIZE})
+        self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
+
+    def render(
+        self,
+        light_mesh: VirtualLightMesh,
+        origin: Float64,
+        shadows: LampShadows,
+        shadow_samples: int,
+        progress: Progress = silent,
+    ) -> moderngl.Buffer:
+        """One vec4 a light: rgb = strength (emission + colour x irradiance) in W/m², w 0.
+
+        Irradiance is the weighted mean over the light's source samples, each with its own shadows; soft lamps are
+        the mean over `shadow_samples` points. origin: (3,) float64, the geometry's. Raises DeviceError where the
+        samples do not fit the device, Cancelled when `progress` says so.
+        """
+        count = len(light_mesh)
+        emitted = np.zeros((max(count, 1), 4), np.float32)
+        emitted[:count, :3] = light_mesh.strength[:, None] * light_mesh.emission
+        radiosity = self._context.buffer(emitted.tobytes())
+        if count == 0:
+            return radiosity
+        samples, lights = source_records(light_mesh, origin)
+        self._require_room(samples.nbytes, len(samples))
+        buffers = {"SOURCE_SAMPLE_BINDING": samples.tobytes() or bytes(16), "SOURCE_LIGHT_BINDING": lights.tobytes()}
+        held = {name: self._context.buffer(data) for name, data in buffers.items()}
+        runs = [
+            (lamp, sample, shadows.samples_of(lamp, shadow_samples))
+            for lamp in range(len(shadows.lights))
+            for sample in range(shadows.samples_of(lamp, shadow_samples))
+        ]
+        for done, (lamp, sample, sample_count) in enumerate(runs):
+            step(progress, done / len(runs), "phase one")
+            shadow_map = shadows.shadow_map(lamp, sample, sample_count)
+            self._lamp.write(shadow_map.record.tobytes())
+            self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
+            for name, buffer in held.items():
+                buffer.bind_to_storage_buffer(int(CONSTANTS[name]))
+            radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
+            shadow_map.bind()
+            set_uniforms(self._shader, {"share": shadow_map.share, "light_count": count})
+            self._shader.run(-(-count // GROUP_SIZE))
+            self._context.memory_barrier()
+        return radiosity
+
+    def _require_room(self, size: int, count: int) -> None:
+        limit = int(self._context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
+        if size > limit:
+            most = limit // SOURCE_SAMPLE.dtype.itemsize
+            raise DeviceError(f"{count:,} source samples; the device holds {most:,}; bake fewer lights or samples")
+
+
+def source_records(light_mesh: VirtualLightMesh, origin: Float64) -> tuple[np.ndarray, np.ndarray]:
+    """Records of SOURCE_SAMPLE and SOURCE_LIGHT. origin: (3,) float64, world space."""
+    samples = light_mesh.samples
+    points = SOURCE_SAMPLE.zeros(len(samples.positions))
+    points["position"] = samples.positions - origin
+    points["normal"] = samples.normals
+    points["weight"] = samples.weights
+    lights = SOURCE_LIGHT.zeros(len(light_mesh))
+    lights["reflectance"] = light_mesh.strength[:, None] * light_mesh.colour
+    lights["first_sample"], lights["end_sample"] = samples.offsets[:-1], samples.offsets[1:]
+    return points, lights
+
+
+def read_radiosity(buffer: moderngl.Buffer, count: int) -> Float32:
+    """(count, 3) float32, W/m²."""
+    return np.frombuffer(buffer.read(), np.float32).reshape(-1, 4)[:count, :3].copy()
