@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import bpy
 import numpy as np
 
 from ..core.errors import InvalidInput
@@ -111,19 +110,18 @@ def read_light_meshes(depsgraph: Any, report: FindingList) -> list[VirtualLightM
 
 
 def _left_out(depsgraph: Any, seen: set[str], report: FindingList) -> Iterator[Any]:
-    """Light meshes of the view layer that this depsgraph has not evaluated because it does not show them.
+    """Light meshes of the view layer that this depsgraph does not show: a render engine's leaves out what is hidden.
 
-    They are taken as the viewport has them, or unmodified where it has not evaluated them either.
+    They are taken as the viewport has evaluated them, or as they are stored.
     """
-    layer = depsgraph.view_layer.original if hasattr(depsgraph.view_layer, "original") else depsgraph.view_layer
-    scene = depsgraph.scene.original
-    layer = scene.view_layers[layer.name]
+    layer = depsgraph.scene.original.view_layers[depsgraph.view_layer.name]
     for blender_object in layer.objects:
         if blender_object.type != "MESH" or not is_light_mesh(blender_object) or blender_object.name_full in seen:
             continue
         evaluated = blender_object.evaluated_get(layer.depsgraph) if layer.depsgraph else blender_object
-        if not evaluated.is_evaluated and len(blender_object.modifiers):
-            report(f"light mesh {blender_object.name!r}", "its modifiers are not evaluated", "show it in the viewport")
+        if not evaluated.is_evaluated and (len(blender_object.modifiers) or is_dynamic(blender_object)):
+            problem = "its modifiers and animation are not evaluated in this render"
+            report(f"light mesh {blender_object.name!r}", problem, "show it in the viewport")
         yield evaluated
 
 
@@ -175,9 +173,3 @@ def _read_lights(
         dynamic=np.full(lights, bool(blender_object.get(DYNAMIC_PROPERTY, False)) or is_dynamic(original)),
         samples=unsampled(lights),
     )
-
-
-def light_mesh_objects(view_layer: Any = None) -> list[Any]:
-    """The (original) light mesh objects of a view layer, by default the current one."""
-    layer = view_layer or bpy.context.view_layer
-    return [item for item in layer.objects if item.type == "MESH" and is_light_mesh(item)]

@@ -151,6 +151,8 @@ def save_blend(path: Path | str, opened: OpenedScene | None = None) -> None:
     if opened is not None:
         _restore(opened)
     with atomic_output(path) as temporary:
+        # Over a file that is there, Blender would leave a backup beside it.
+        temporary.unlink()
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True, check_existing=False, relative_remap=True)
         except RuntimeError as error:
