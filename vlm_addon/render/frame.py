@@ -5,14 +5,29 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..core.errors import InvalidInput
-from ..core.light_mesh import VirtualLightMesh
-from ..core.progress import Progress
-from ..core.scene import SceneSnapshot
+from ..core.light_mesh import VirtualLightMesh, require_valid
+from ..core.progress import Progress, step
+from ..core.scene import Camera, Finding, Float32, SceneSnapshot
+from ..core.settings import from_mapping
 from .frame_types import Frame, RenderSettings
+from .geometry import GpuGeometry
+from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
+from .passes.direct_light import DirectLightPass
+from .passes.gbuffer import GBufferPass
+from .passes.shadow_map import LampShadows
+from .technique import FrameInputs, SceneInputs, technique_by_name
+from .view import make_view
 
 if TYPE_CHECKING:
     from .device import Device
+
+NO_SURFACE = -1
+# Share of a frame's progress that comes before its first sample.
+PREPARED = 0.1
+MAX_SIZE, MAX_SAMPLES, MAX_SHADOW_RESOLUTION, MAX_SHADOW_SAMPLES = 16384, 4096, 8192, 1024
 
 
 def render_frame(
@@ -22,5 +37,122 @@ def render_frame(
     settings: RenderSettings,
     progress: Progress,
 ) -> Frame:
-    """The picture of `snapshot`. Raises InvalidInput for what cannot be rendered."""
-    raise InvalidInput("renderer", "no pass is built yet", "wait for the next commit")
+    """The picture of `snapshot`. Raises InvalidInput for what cannot be rendered, Cancelled when asked to stop."""
+    technique_type = technique_by_name(settings.technique)
+    chosen: object = from_mapping(
+        technique_type.settings, settings.technique_settings, f"technique {settings.technique!r}"
+    )
+    camera = _require_renderable(snapshot, light_mesh, settings)
+    context, shaders, timer = device.context, device.shaders, device.timer()
+    width, height = settings.width, settings.height
+    step(progress, 0.0, "geometry")
+    with timer.measure("geometry"):
+        geometry = GpuGeometry(context, snapshot)
+    shadows = LampShadows(context, shaders, geometry, snapshot.lights, settings.shadow_resolution)
+    scene = SceneInputs(
+        context, shaders, timer, snapshot, geometry, shadows, light_mesh, settings, _within(progress, 0.0, PREPARED)
+    )
+    technique = technique_type(scene, chosen)
+    direct_light = DirectLightPass(context, shaders, width, height)
+    gbuffer_pass = GBufferPass(context, shaders, width, height)
+    accumulate = AccumulatePass(context, shaders, width, height)
+
+    for sample, jitter in enumerate(jitter_offsets(settings.samples)):
+        view = make_view(camera, width, height, geometry.origin, tuple(jitter))
+        with timer.measure("G-buffer"):
+            gbuffer = gbuffer_pass.render(geometry, view, sample)
+        with timer.measure("direct light"):
+            direct = direct_light.render(gbuffer, shadows, view, sample, settings.samples)
+        share = (1.0 - PREPARED) / settings.samples
+        sample_progress = _within(progress, PREPARED + sample * share, share)
+        irradiance = technique.indirect(FrameInputs(view, gbuffer, sample, sample_progress))
+        with timer.measure("accumulate"):
+            weight = 1.0 / settings.samples
+            accumulate.add(gbuffer, direct, irradiance, view, snapshot.world_radiance, weight)
+        step(sample_progress, 1.0, "samples")
+
+    with timer.measure("read back"):
+        sums = accumulate.read()
+    images, findings = _finished_images(sums)
+    if settings.buffers:
+        images |= {"irradiance": images.pop("irradiance"), "coverage": sums["direct"][..., 3:]}
+        images |= _surface_images(gbuffer_pass, geometry, camera, settings)
+    else:
+        del images["irradiance"]
+    counters = {
+        "triangles": geometry.triangle_count,
+        "lights": len(snapshot.lights),
+        "samples": settings.samples,
+        **technique.counters(),
+    }
+    findings += _scene_findings(snapshot, light_mesh)
+    return Frame(images, timer.timings(), counters, device.name, timer.kind, tuple(findings))
+
+
+def _require_renderable(
+    snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings
+) -> Camera:
+    """The camera. Raises InvalidInput."""
+    limits = {
+        "width": MAX_SIZE,
+        "height": MAX_SIZE,
+        "samples": MAX_SAMPLES,
+        "shadow_resolution": MAX_SHADOW_RESOLUTION,
+        "shadow_samples": MAX_SHADOW_SAMPLES,
+    }
+    for name, limit in limits.items():
+        value = getattr(settings, name)
+        if not 1 <= value <= limit:
+            raise InvalidInput(f"render setting {name!r}", f"{value} is out of range", f"give 1 to {limit}")
+    if snapshot.camera is None:
+        raise InvalidInput(f"scene {snapshot.name!r}", "it has no camera", "add one and make it the active camera")
+    if light_mesh is not None:
+        require_valid(light_mesh)
+    return snapshot.camera
+
+
+def _within(progress: Progress, start: float, share: float) -> Progress:
+    """Progress of a part of the work that begins at `start` and takes `share` of it all."""
+    return lambda fraction, label: progress(start + fraction * share, label)
+
+
+def _finished_images(sums: dict[str, Float32]) -> tuple[dict[str, Float32], list[Finding]]:
+    """The pictures with every value finite and at least 0, and what had to be changed for that."""
+    images, findings = {}, []
+    for name, values in sums.items():
+        values = values if name == "combined" else values[..., :3]
+        broken = ~np.isfinite(values).all(axis=2)
+        if broken.any():
+            problem = f"{int(broken.sum())} pixels were not finite"
+            findings.append(Finding(f"image {name!r}", problem, "set to 0; look for broken values in the materials"))
+        clean = np.where(broken[..., None], 0.0, np.maximum(values, 0.0))
+        images[name] = np.ascontiguousarray(clean, np.float32)
+    return images, findings
+
+
+def _surface_images(
+    gbuffer_pass: GBufferPass, geometry: GpuGeometry, camera: Camera, settings: RenderSettings
+) -> dict[str, Float32]:
+    """What shows at the pixels' centres: world positions in m, normals, base colour, depth in m, ids."""
+    gbuffer = gbuffer_pass.render(geometry, make_view(camera, settings.width, settings.height, geometry.origin), 0)
+    position, normal, base_color, ids = (
+        read_image(texture) for texture in (gbuffer.position, gbuffer.shading_normal, gbuffer.base_color, gbuffer.ids)
+    )
+    shown = np.any(normal[..., :3] != 0.0, axis=2, keepdims=True)
+    images = {
+        "position": np.where(shown, position[..., :3] + geometry.origin, 0.0),
+        "normal": normal[..., :3],
+        "albedo": base_color[..., :3],
+        "depth": position[..., 3:],
+    }
+    for channel, name in enumerate(("material_id", "tag_id", "face_id")):
+        images[name] = np.where(shown, ids[..., channel : channel + 1], NO_SURFACE)
+    return {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
+
+
+def _scene_findings(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None) -> list[Finding]:
+    glows = any(max(material.emission) > 0.0 for material in snapshot.materials)
+    shines = light_mesh is not None and bool((light_mesh.emission > 0.0).any())
+    if snapshot.lights or glows or shines or max(snapshot.world_radiance) > 0.0:
+        return []
+    return [Finding(f"scene {snapshot.name!r}", "nothing in it gives light", "add a lamp or an emissive material")]

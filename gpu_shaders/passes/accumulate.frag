@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One jittered picture put together and weighted for the sum over all of them.
+#include "passes/gbuffer_samplers.glsl"
+#include "passes/reflectance.glsl"
+
+layout(binding = DIRECT_UNIT) uniform sampler2D direct_radiance;    // W/(m² sr)
+#ifdef HAS_INDIRECT
+layout(binding = IRRADIANCE_UNIT) uniform sampler2D irradiance;     // W/m²
+#endif
+
+uniform vec3 camera_position;   // m, from the local origin
+uniform vec3 camera_backward;   // unit
+uniform bool is_orthographic;
+uniform vec3 world_radiance;    // W/(m² sr)
+uniform float weight;           // one over the number of pictures
+
+layout(location = 0) out vec4 out_combined;
+layout(location = 1) out vec4 out_direct;       // w: share of the pixel that shows geometry
+layout(location = 2) out vec4 out_indirect;
+layout(location = 3) out vec4 out_irradiance;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    if (!pixel_shows_geometry(pixel)) {
+        out_combined = weight * vec4(world_radiance, 1.0);
+        out_direct = out_indirect = out_irradiance = vec4(0.0);
+        return;
+    }
+    Surface surface = fetch_surface(pixel);
+    vec3 direct = texelFetch(direct_radiance, pixel, 0).rgb;
+    vec3 received = vec3(0.0);
+#ifdef HAS_INDIRECT
+    received = texelFetch(irradiance, pixel, 0).rgb;
+#endif
+    vec3 to_camera = is_orthographic ? camera_backward : normalize(camera_position - surface.position);
+    vec3 indirect = diffuse_albedo(surface, to_camera) * received * INVERSE_PI;
+    out_combined = weight * vec4(surface.emission + direct + indirect, 1.0);
+    out_direct = weight * vec4(direct, 1.0);
+    out_indirect = weight * vec4(indirect, 1.0);
+    out_irradiance = weight * vec4(received, 1.0);
+}

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sums of jittered pictures, and where in a pixel each of them looks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.scene import Float32, Float64
+from ..albedo_texture import AlbedoTexture
+from ..fullscreen import FullscreenPass
+from ..gpu_layout import CONSTANTS
+from ..shader_library import ShaderLibrary, set_uniforms
+from ..view import View
+from .gbuffer import GBuffer
+
+if TYPE_CHECKING:
+    import moderngl
+
+DIRECT_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
+IRRADIANCE_UNIT = DIRECT_UNIT + 1
+OUTPUTS = ("combined", "direct", "indirect", "irradiance")
+
+
+class AccumulatePass:
+    """Emission, direct and indirect light of each sample, averaged over the samples with equal weights (box filter).
+
+    Sums are float32: after n samples they are good to n/2 units in the last place. A value that is not a number
+    stays in its pixel.
+    """
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
+        self._context = context
+        self._shaders = shaders
+        self._sums = [context.texture((width, height), 4, dtype="f4") for _ in OUTPUTS]
+        self._framebuffer = context.framebuffer(self._sums)
+        self._framebuffer.clear()
+        self._albedo = AlbedoTexture(context)
+
+    def add(
+        self,
+        gbuffer: GBuffer,
+        direct: moderngl.Texture,
+        irradiance: moderngl.Texture | None,
+        view: View,
+        world_radiance: tuple[float, float, float],
+        weight: float,
+    ) -> None:
+        """Adds one picture. direct: radiance. irradiance: W/m², None for none. weight: one over the sample count."""
+        defines: dict[str, int | bool] = {"DIRECT_UNIT": DIRECT_UNIT, "IRRADIANCE_UNIT": IRRADIANCE_UNIT}
+        if irradiance is not None:
+            defines["HAS_INDIRECT"] = True
+            irradiance.use(IRRADIANCE_UNIT)
+        combine = FullscreenPass(self._context, self._shaders, "passes/accumulate.frag", defines)
+        gbuffer.bind()
+        self._albedo.bind()
+        direct.use(DIRECT_UNIT)
+        set_uniforms(
+            combine.program,
+            {
+                "camera_position": view.position,
+                "camera_backward": view.backward,
+                "is_orthographic": view.is_orthographic,
+                "world_radiance": world_radiance,
+                "weight": weight,
+            },
+        )
+        combine.draw(self._framebuffer, additive=True)
+
+    def read(self) -> dict[str, Float32]:
+        """The sums by the names of OUTPUTS: (h, w, 4) float32, row 0 at the top; `direct` has coverage as alpha."""
+        return {name: read_image(texture) for name, texture in zip(OUTPUTS, self._sums, strict=True)}
+
+
+def read_image(texture: moderngl.Texture) -> np.ndarray:
+    """The texture's pixels, (h, w, c) float32 or int32, row 0 at the top."""
+    width, height = texture.size
+    kind = np.int32 if texture.dtype == "i4" else np.float32
+    return np.frombuffer(texture.read(), kind).reshape(height, width, texture.components)[::-1].copy()
+
+
+def jitter_offsets(samples: int) -> Float64:
+    """(samples, 2) float64: where each picture looks in a pixel, from its centre, in [-0.5, 0.5), mean 0.
+
+    Hammersley's points: one in each of `samples` columns, and evenly spread over the rows.
+    """
+    indices = np.arange(samples)
+    rows, digit, rest = np.zeros(samples), 0.5, indices.copy()
+    while rest.any():
+        rows += digit * (rest & 1)
+        rest >>= 1
+        digit *= 0.5
+    offsets = np.stack([(indices + 0.5) / samples, rows], axis=1)
+    return offsets - offsets.mean(axis=0)

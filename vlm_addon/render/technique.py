@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a technique of indirect light is, and the list of those in `techniques/`."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..core.errors import InvalidInput
+from ..core.light_mesh import VirtualLightMesh
+from ..core.progress import Progress
+from ..core.scene import SceneSnapshot
+from . import techniques
+from .frame_types import RenderSettings
+from .geometry import GpuGeometry
+from .passes.gbuffer import GBuffer
+from .passes.shadow_map import LampShadows
+from .shader_library import ShaderLibrary
+from .view import View
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from .device import PassTimer
+
+
+@dataclass(frozen=True)
+class SceneInputs:
+    """What stays the same over the samples of a frame.
+
+    light_mesh: None where the caller gave none. progress: of the work before the first sample.
+    """
+
+    context: moderngl.Context
+    shaders: ShaderLibrary
+    timer: PassTimer
+    snapshot: SceneSnapshot
+    geometry: GpuGeometry
+    shadows: LampShadows
+    light_mesh: VirtualLightMesh | None
+    settings: RenderSettings
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class FrameInputs:
+    """One jittered picture of the scene. progress: of this picture alone."""
+
+    view: View
+    gbuffer: GBuffer
+    sample_index: int
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class NoSettings:
+    """Of a technique that has nothing to set."""
+
+
+class Technique(ABC):
+    """One way to find the indirect light; made anew for each frame. Its docstring states its known bias."""
+
+    name: ClassVar[str]
+    label: ClassVar[str]
+    description: ClassVar[str]
+    settings: ClassVar[type] = NoSettings
+    needs_light_mesh: ClassVar[bool] = False
+
+    def __init__(self, scene: SceneInputs, settings: Any) -> None:
+        """Does what is needed once for all samples of a frame. settings: an instance of `settings`.
+
+        Raises InvalidInput where the technique needs a light mesh and there is none.
+        """
+        if self.needs_light_mesh and not scene.light_mesh:
+            raise InvalidInput(f"technique {self.name!r}", "the scene has no virtual light mesh", "bake one first")
+        self.scene = scene
+        self.chosen = settings
+
+    @abstractmethod
+    def indirect(self, frame: FrameInputs) -> moderngl.Texture | None:
+        """Irradiance of each pixel in W/m², RGBA32F of the G-buffer's size; None for none at all."""
+
+    def counters(self) -> dict[str, float]:
+        """What the technique counted so far in this frame."""
+        return {}
+
+
+@lru_cache(maxsize=1)
+def technique_list() -> tuple[type[Technique], ...]:
+    """The techniques in the files of `techniques/`, by name. An import error there is raised."""
+    found: dict[str, type[Technique]] = {}
+    for module_info in pkgutil.iter_modules(techniques.__path__):
+        module = importlib.import_module(f"{techniques.__name__}.{module_info.name}")
+        for _, member in inspect.getmembers(module, inspect.isclass):
+            is_own = member.__module__ == module.__name__
+            if is_own and issubclass(member, Technique) and not inspect.isabstract(member):
+                found[member.name] = member
+    return tuple(found[name] for name in sorted(found))
+
+
+def technique_by_name(name: str) -> type[Technique]:
+    """Raises InvalidInput that lists the names there are."""
+    by_name = {technique.name: technique for technique in technique_list()}
+    if name not in by_name:
+        raise InvalidInput(f"technique {name!r}", "no such technique", f"use one of: {', '.join(by_name)}")
+    return by_name[name]

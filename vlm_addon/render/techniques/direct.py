@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The picture without indirect light: what every other technique adds to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..technique import FrameInputs, Technique
+
+if TYPE_CHECKING:
+    import moderngl
+
+
+class Direct(Technique):
+    """Lamps and emission only. Known bias: all bounced light is missing."""
+
+    name = "direct"
+    label = "Direct light only"
+    description = "Lamps and glowing surfaces without any bounce; all indirect light is missing"
+
+    def indirect(self, frame: FrameInputs) -> moderngl.Texture | None:
+        """None: there is no indirect light."""
+        return None
