@@ -16,7 +16,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-COMMITTED = ("cornell_box", "empty_room")
+COMMITTED = ("cornell_box", "empty_room", "monkey_box")
 ON_DEMAND: tuple[str, ...] = ()
 HERE = Path(__file__).resolve().parent
 
@@ -28,15 +28,19 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     names = (*COMMITTED, *ON_DEMAND)
     parser.add_argument("names", nargs="+", metavar="NAME", choices=[*names, "all"], help=", ".join([*names, "all"]))
     parser.add_argument("--out", type=Path, default=HERE, metavar="DIR", help="folder to write to (default: this one)")
+    parser.add_argument("--mesh", type=Path, metavar="FILE", help="monkey_box: float this OBJ, PLY or glTF instead")
     return parser.parse_args(arguments)
 
 
-def build(name: str, folder: Path) -> Path:
+def build(name: str, options: argparse.Namespace) -> Path:
     """Builds one scene and returns the file written."""
     from scenes import blend
 
-    importlib.import_module(f"scenes.{name}").build()
-    path = folder / f"{name}.blend"
+    arguments, stem = {}, name
+    if name == "monkey_box" and options.mesh:
+        arguments, stem = {"mesh_path": options.mesh}, f"{options.mesh.stem}_box"
+    importlib.import_module(f"scenes.{name}").build(**arguments)
+    path = options.out / f"{stem}.blend"
     blend.save(str(path))
     return path
 
@@ -47,7 +51,7 @@ def main(arguments: Sequence[str]) -> int:
     names = COMMITTED if "all" in options.names else options.names
     options.out.mkdir(parents=True, exist_ok=True)
     for name in names:
-        path = build(name, options.out)
+        path = build(name, options)
         print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
     return 0
 

@@ -39,7 +39,7 @@ SPHERE_RADIUS = 0.825
 SPHERE_SUBDIVISIONS = 4
 
 # The lamp's colour is white because the reflectances were integrated under the white point; its power by eye.
-LAMP_POWER_W = 220.0
+LAMP_POWER_W = 170.0
 PANEL_DROP, LAMP_DROP = 0.004, 0.008
 
 # How far the lights lie behind the surfaces they stand for.

@@ -43,7 +43,7 @@ def build() -> None:
         blend.add_mesh(scene, name, wall, blend.diffuse(name, REFLECTANCES[name]))
     lamp = blend.add_lamp(scene, "Lamp", "POINT", LAMP_POWER_W, (0.0, 0.0, 0.0))
     lamp.data.shadow_soft_size = 0.0
-    blend.add_camera(scene, (-1.8, -1.3, 0.55), (0.55, 0.5, -0.18), lens_mm=17.0)
+    blend.add_camera(scene, (-1.8, -1.0, 0.55), (0.55, 0.45, -0.18), lens_mm=17.0)
     lights = walls(LIGHT_SPLIT, LIGHT_INSET)
     patches = [blend.LightPatch(wall, REFLECTANCES[name]) for name, wall in lights.items()]
     blend.add_light_mesh(scene, "Room light mesh", patches)

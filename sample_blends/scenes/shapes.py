@@ -159,8 +159,9 @@ def icosphere(radius: float, subdivisions: int, smooth: bool = True) -> Shape:
     corners = [(a, b, 0.0) for a, b in pairs] + [(0.0, a, b) for a, b in pairs] + [(b, 0.0, a) for a, b in pairs]
     vertices = [np.array(corner) / math.hypot(1, golden) for corner in corners]
     faces: list[Face] = [
-        (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4),
-        (11, 10, 2), (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1),
+        (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6),
+        (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7),
+        (9, 8, 1),
     ]  # fmt: skip
     for _ in range(subdivisions):
         middles: dict[tuple[int, int], int] = {}
