@@ -2,7 +2,7 @@
 """A finely subdivided head floating in a closed box under a spotlight: the setting of seed 001 with Blender's monkey.
 
 Three Catmull-Clark levels of the monkey alone give 62,976 triangles; one more edge loop through its longest ring of
-quads makes that 69,632, as many as the bunny's 69,451 for all that matters here. Any other mesh can float instead.
+quads makes that 69,696, as many as the bunny's 69,451 for all that matters here. Any other mesh can float instead.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ FLOATER_EXTENT = 1.5  # the longest side of its bounding box
 RENDER_LEVELS, VIEWPORT_LEVELS = 3, 1
 
 WHITE, RED, BLUE = (0.75, 0.75, 0.75), (0.63, 0.10, 0.08), (0.12, 0.22, 0.60)
-FLOATER_COLOR = (0.72, 0.66, 0.55)
-SPOT_POWER_W, SPOT_DEGREES = 620.0, 62.0
+FLOATER_COLOR = (0.60, 0.55, 0.46)
+SPOT_POWER_W, SPOT_DEGREES = 300.0, 62.0
 
 
 def walls() -> dict[str, Shape]:
@@ -87,18 +87,21 @@ def read_mesh(path: Path) -> Shape:
     }
     if path.suffix.lower() not in importers or not path.is_file():
         raise SystemExit(f"{path}: not a readable OBJ, PLY or glTF file; give the path of one")
+    present = set(bpy.data.objects)
     importers[path.suffix.lower()](filepath=str(path))
-    imported = [thing for thing in bpy.context.scene.objects if thing.type == "MESH"]
+    imported = sorted(set(bpy.data.objects) - present, key=lambda thing: str(thing.name))
     vertices: list[npt.NDArray[np.float64]] = []
     faces: list[list[int]] = []
     for thing in imported:
+        if thing.type != "MESH":
+            continue
         start = sum(len(part) for part in vertices)
         matrix = np.array(thing.matrix_world)
         local = np.empty(3 * len(thing.data.vertices), np.float32)
         thing.data.vertices.foreach_get("co", local)
         vertices.append(local.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
         faces += [[start + index for index in polygon.vertices] for polygon in thing.data.polygons]
-    for thing in list(bpy.context.scene.objects):
+    for thing in imported:
         bpy.data.objects.remove(thing)
     if not faces:
         raise SystemExit(f"{path}: no polygons; give a file with a mesh")
@@ -132,5 +135,5 @@ def build(mesh_path: Path | None = None) -> None:
     for name, wall in walls().items():
         blend.add_mesh(scene, name, wall, colors.get(name, white))
     add_floater(scene, mesh_path)
-    blend.add_spot(scene, "Spot", SPOT_POWER_W, (1.35, 0.45, 2.85), (-0.25, 2.35, 0.95), SPOT_DEGREES, 0.25, 0.05)
+    blend.add_spot(scene, "Spot", SPOT_POWER_W, (1.2, 0.3, 2.6), (-0.2, 2.35, 1.05), SPOT_DEGREES, 0.25, 0.05)
     blend.add_camera(scene, (0.0, 0.06, 1.5), (0.0, 2.0, 1.42), lens_mm=22.0)
