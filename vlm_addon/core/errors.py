@@ -27,6 +27,7 @@ class Cancelled(VlmError):
 
     def __init__(self, label: str) -> None:
         super().__init__(f"{label}: cancelled, nothing was changed")
+        self.label = label
 
 
 class DeviceError(VlmError):

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The renderer's process: reads scenes from its standard input, renders, answers; ends when the input closes.
+
+Messages in: `render` (scene, settings, where its arrays lie), `cancel`. Messages out: `hello`, `progress`, `frame`,
+`error`. Arrays lie in files of a folder that the parent owns.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+import traceback
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..core.array_codec import flatten, unflatten
+from ..core.errors import Cancelled, InvalidInput, VlmError
+from ..core.scene_codec import light_mesh_from_tree, snapshot_from_tree
+from .device import Device
+from .frame_types import RenderSettings
+from .framing import PROTOCOL_VERSION, map_arrays, read_message, store_arrays, write_message
+
+
+def main(folder: str) -> None:
+    """Serves until the input closes."""
+    answers = _private_output()
+    try:
+        device = Device()
+    except VlmError as error:
+        write_message(answers, _error_message(error))
+        return
+    with device:
+        write_message(answers, {"type": "hello", "version": PROTOCOL_VERSION, "device": device.name})
+        server = _Server(device, Path(folder), answers)
+        while True:
+            server.answer(server.requests.get())
+
+
+def _private_output() -> BinaryIO:
+    """Standard output as this process's own pipe; what libraries print goes to standard error instead."""
+    private = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    return private
+
+
+class _Server:
+    def __init__(self, device: Device, folder: Path, answers: BinaryIO) -> None:
+        self.requests: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._device = device
+        self._folder = folder
+        self._answers = answers
+        self._cancelled = threading.Event()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        """Takes messages while a picture is being rendered; without a parent there is nobody to render for."""
+        while True:
+            message = read_message(sys.stdin.buffer)
+            if message is None:
+                os._exit(0)
+            if message["type"] == "cancel":
+                self._cancelled.set()
+            else:
+                self._cancelled.clear()
+                self.requests.put(message)
+
+    def answer(self, request: dict[str, Any]) -> None:
+        """Renders one picture and sends it, or the error in its place."""
+        try:
+            write_message(self._answers, self._render(request))
+        except VlmError as error:
+            write_message(self._answers, _error_message(error))
+        except Exception as error:  # noqa: BLE001  a bug in one picture must not end the process silently
+            traceback.print_exc()
+            failure = VlmError(f"renderer: {type(error).__name__}: {error}; please report it with the log")
+            write_message(self._answers, _error_message(failure))
+
+    def _render(self, request: dict[str, Any]) -> dict[str, Any]:
+        arrays = map_arrays(self._folder / request["file"], request["arrays"])
+        tree = unflatten(request["scene"], arrays)
+        lights = tree["light_mesh"]
+        frame = self._device.render(
+            snapshot_from_tree(tree["snapshot"]),
+            light_mesh_from_tree(lights) if lights is not None else None,
+            RenderSettings(**request["settings"]),
+            self._progress,
+        )
+        answer, images = flatten(frame)
+        file = f"frame-{request['number']}.bin"
+        return {"type": "frame", "frame": answer, "file": file, "arrays": store_arrays(self._folder / file, images)}
+
+    def _progress(self, fraction: float, label: str) -> bool:
+        write_message(self._answers, {"type": "progress", "fraction": fraction, "label": label})
+        return not self._cancelled.is_set()
+
+
+def _error_message(error: VlmError) -> dict[str, Any]:
+    parts: list[str] = [str(error)]
+    if isinstance(error, InvalidInput):
+        parts = [error.subject, error.problem, error.remedy]
+    elif isinstance(error, Cancelled):
+        parts = [error.label]
+    return {"type": "error", "kind": type(error).__name__, "parts": parts}
