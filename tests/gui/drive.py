@@ -18,6 +18,7 @@ ZIP, FOLDER = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 SECONDS_FOR_REDRAW = 0.7
 LONGEST_WAIT_SECONDS = 120.0
 GRID = 700
+PICTURES = []
 STORY = {"version": bpy.app.version_string, "seen": []}
 
 
@@ -57,7 +58,6 @@ def look(name):
     """Screenshot of all windows into FOLDER."""
     subprocess.run(["import", "-window", "root", str(FOLDER / f"{name}.png")], check=True)
     STORY["seen"].append(name)
-    print("JOB", name, bpy.app.is_job_running("RENDER"))
 
 
 def until(condition):
@@ -82,9 +82,14 @@ def there_is_none():
 
 
 def picture_is_shown():
-    return any(
-        area.type == "IMAGE_EDITOR" for each in bpy.context.window_manager.windows for area in each.screen.areas
-    ) and not bpy.app.is_job_running("RENDER")
+    editors = [
+        area for each in bpy.context.window_manager.windows for area in each.screen.areas if area.type == "IMAGE_EDITOR"
+    ]
+    return bool(PICTURES and editors) and not bpy.app.is_job_running("RENDER")
+
+
+def keep_count(scene, *_):
+    PICTURES.append(scene.name)
 
 
 def nothing_runs():
@@ -93,6 +98,7 @@ def nothing_runs():
 
 def close_picture():
     """Close the windows that Blender opened for pictures."""
+    PICTURES.clear()
     for each in bpy.context.window_manager.windows[1:]:
         with bpy.context.temp_override(window=each):
             bpy.ops.wm.window_close()
@@ -185,9 +191,10 @@ def story():
     for name in light_meshes():
         bpy.data.objects.remove(bpy.data.objects[name])
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=GRID, y_subdivisions=GRID, size=2.0)
+    bpy.context.object.display_type = "BOUNDS"
     with in_view():
         STORY["long work"] = sorted(bpy.ops.vlm.create_from_selection("INVOKE_DEFAULT", target_triangles=100))
-    yield SECONDS_FOR_REDRAW
+    yield 4 * SECONDS_FOR_REDRAW
     STORY["ran at Esc"] = not nothing_runs()
     look("8_progress")
     press("ESC")
@@ -219,4 +226,5 @@ def run(steps):
 
 
 bpy.context.preferences.view.show_splash = False
+bpy.app.handlers.render_complete.append(keep_count)
 bpy.app.timers.register(run(story()), first_interval=2.0)

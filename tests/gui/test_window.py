@@ -52,7 +52,7 @@ def story(tmp_path_factory):
     keep = os.environ.get("VLM_SCREENSHOTS")
     if keep:
         shutil.copytree(folder, keep, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.zip", "*.json", "*.py"))
-    return {**told, "folder": folder, "output": print(done.stdout) or done.stdout + done.stderr}
+    return {**told, "folder": folder, "output": done.stdout + done.stderr}
 
 
 def command(chroot, folder, package):

@@ -118,12 +118,28 @@ def list_findings(scene: Any, findings: Sequence[Finding]) -> None:
 
 
 def render_picture(context: Any) -> None:
-    """Render the scene by our engine: beside the window that shows the picture, or at once where there is no window."""
+    """Render the scene by our engine: beside the window that shows the picture, or at once where there is no window.
+
+    The window is opened after the operator that asks for it has ended: while it opens, Blender handles events, and
+    would call the modal operator again from within.
+    """
     context.scene.render.engine = ENGINE_ID
+    if not bpy.app.background:
+        bpy.app.timers.register(render_in_window)
+        return
     try:
-        bpy.ops.render.render(*(() if bpy.app.background else ("INVOKE_DEFAULT",)))
+        bpy.ops.render.render()
     except RuntimeError as error:
         raise VlmError(str(error).strip()) from error
+
+
+def render_in_window() -> None:
+    """Timer callback: F12 in the first window whose scene uses our engine."""
+    for window in bpy.context.window_manager.windows:
+        if window.scene.render.engine == ENGINE_ID:
+            with bpy.context.temp_override(window=window):
+                bpy.ops.render.render("INVOKE_DEFAULT")
+            return
 
 
 def allow(operator: Any, problem: str | None) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from . import cli_commands, engine, engine_panels, panels, properties
+from . import authoring, cli_commands, engine, engine_panels, panels, properties
 from .render_process import KEPT
 
 _REGISTERED = ExitStack()
@@ -23,6 +23,7 @@ def register(operator_classes: Iterable[type]) -> None:
     """
     with ExitStack() as undo:
         undo.callback(KEPT.close)
+        undo.callback(_stop_timer)
         scene_classes = properties.scene_property_classes()
         for cls in (*scene_classes, *operator_classes, *panels.CLASSES, engine.VLM_RenderEngine):
             bpy.utils.register_class(cls)
@@ -39,6 +40,11 @@ def register(operator_classes: Iterable[type]) -> None:
 def unregister() -> None:
     """Take out all that `register` added and end the renderer's process."""
     _REGISTERED.close()
+
+
+def _stop_timer() -> None:
+    if bpy.app.timers.is_registered(authoring.render_in_window):
+        bpy.app.timers.unregister(authoring.render_in_window)
 
 
 def _add_scene_settings(group: Any) -> None:
