@@ -43,7 +43,9 @@ def reduce_groups(positions: Float64, triangles: Int64, group: Int64, weight: Fl
     """About `target` triangles, or more, shared among the groups, with the lines between groups in place.
 
     Half of them by weight, because light comes from there, and half by number of triangles, because a detailed shape
-    needs some whatever its size. positions: (v, 3). triangles: (t, 3), an oriented manifold with border. group: (t,). weight: (t,) non-negative.
+    needs some whatever its size.
+
+    positions: (v, 3). triangles: (t, 3), an oriented manifold with border. group: (t,). weight: (t,) non-negative.
     """
     apart, origin = _cut_between_groups(triangles, group, len(positions))
     points = positions[origin]
@@ -131,7 +133,8 @@ def _run(positions: Float64, triangles: Int64, loose: Bool, budget: int) -> Redu
     moved = positions.copy()
     # The library numbers the vertices of its result in the order of those that still have a triangle.
     left = np.unique(merged[local][_distinct(merged[local])])
-    moved[used[left]] = points
+    touched = np.isin(left, collapses)
+    moved[used[left[touched]]] = points[touched]
     return Reduced(moved, mapped[keep], keep, vertex_map)
 
 

@@ -29,8 +29,8 @@ SELECTION_ROUNDS = 4
 class Rules:
     """What a collapse may do to the triangles around it.
 
-    minimum_turn_cosine: between a triangle's normal before and after. minimum_quality: of a triangle that becomes
-    worse, 1 for equilateral. keep_features: whether group borders keep their line.
+    minimum_turn_cosine: between a triangle's normal after and both before and at the very start. minimum_quality: of
+    a triangle that becomes worse, 1 for equilateral. keep_features: whether group borders keep their line.
     """
 
     minimum_turn_cosine: float
@@ -61,6 +61,8 @@ class _State:
     triangles: Int64
     source_triangle: Int64
     group: Int64
+    first_normal: Float64
+    """(t, 3): unit normal of the input triangle that each continues."""
     planes: Float64
     """(v, 10): xx xy xz yy yz zz of A, b, c of the plane quadric x.A x - 2 b.x + c."""
     moments: Float64
@@ -79,13 +81,16 @@ class _Edges:
     """Ascending key of each edge, for look-up."""
 
 
-def collapse_edges(positions: Float64, triangles: Int64, group: Int64, weight: Float64, target: int) -> CollapsedMesh:
+def collapse_edges(
+    positions: Float64, triangles: Int64, group: Int64, weight: Float64, target: int, normals: Float64 | None = None
+) -> CollapsedMesh:
     """At most `target` triangles where the topology allows it, and at most one or two fewer than that.
 
     positions: (v, 3), an oriented manifold with border (mesh_topology.cut_to_manifold). group: (t,) int64,
     triangles of different groups keep the line between them. weight: (t,) importance, for example reflected power.
+    normals: (t, 3) directions from which no triangle may turn away; of the triangles themselves if not given.
     """
-    state = _initial_state(positions, triangles, group, weight)
+    state = _initial_state(positions, triangles, group, weight, normals)
     level = 0
     while len(state.triangles) > target and level < len(RULES):
         rules = RULES[level]
@@ -99,17 +104,21 @@ def collapse_edges(positions: Float64, triangles: Int64, group: Int64, weight: F
     return CollapsedMesh(state.positions, state.triangles, state.source_triangle, state.vertex_map, merged_borders)
 
 
-def _initial_state(positions: Float64, triangles: Int64, group: Int64, weight: Float64) -> _State:
+def _initial_state(
+    positions: Float64, triangles: Int64, group: Int64, weight: Float64, normals: Float64 | None
+) -> _State:
     vertex_count = len(positions)
     corners = positions[triangles]
-    planes, _ = plane_quadrics(corners, weight / 3.0)
+    planes, own_normals = plane_quadrics(corners, weight / 3.0)
+    normals = own_normals if normals is None else normals
     planes_at = sum_at(np.repeat(planes, 3, axis=0), triangles.ravel(), vertex_count)
     edges = half_edges(triangles, vertex_count)
     planes_at += border_quadrics(positions, triangles, group, weight, edges)
     share = sum_at(np.repeat(weight / 3.0, 3)[:, None], triangles.ravel(), vertex_count)[:, 0]
     square = np.einsum("ij,ij->i", positions, positions)
     moments = np.column_stack([share, share[:, None] * positions, share * square])
-    state = _State(positions, triangles, np.arange(len(triangles)), group, planes_at, moments, np.arange(vertex_count))
+    rows, vertices = np.arange(len(triangles)), np.arange(vertex_count)
+    state = _State(positions, triangles, rows, group, normals, planes_at, moments, vertices)
     return _compacted(state, np.arange(vertex_count))
 
 
@@ -220,7 +229,7 @@ def _shapes_hold(state: _State, edges: _Edges, candidate: Int64, position: Float
     a, b = edges.half.ends[candidate[owner]].T
     moved = (vertex == a[:, None]) | (vertex == b[:, None])
     remains = moved.sum(axis=1) == 1
-    owner, vertex, moved = owner[remains], vertex[remains], moved[remains]
+    owner, face, vertex, moved = owner[remains], face[remains], vertex[remains], moved[remains]
     before = state.positions[vertex]
     after = np.where(moved[:, :, None], position[owner][:, None, :], before)
     normal_before, length_before, quality_before = _shape(before)
@@ -228,6 +237,10 @@ def _shapes_hold(state: _State, edges: _Edges, candidate: Int64, position: Float
     turn = np.einsum("ij,ij->i", normal_before, normal_after)
     flipped = turn <= rules.minimum_turn_cosine * length_before * length_after
     flipped &= length_before > 0
+    first = state.first_normal[face]
+    turn_before = np.einsum("ij,ij->i", first, normal_before) / np.where(length_before > 0, length_before, 1.0)
+    turn_after = np.einsum("ij,ij->i", first, normal_after) / np.where(length_after > 0, length_after, 1.0)
+    flipped |= turn_after < np.minimum(rules.minimum_turn_cosine, turn_before)
     sliver = quality_after < np.minimum(rules.minimum_quality, quality_before)
     sliver |= length_after <= 0
     return np.bincount(owner[flipped | sliver], minlength=len(candidate)) == 0
@@ -295,6 +308,7 @@ def _compacted(state: _State, target: Int64) -> _State:
         triangles=number[triangles],
         source_triangle=state.source_triangle[keep],
         group=state.group[keep],
+        first_normal=state.first_normal[keep],
         planes=state.planes[used],
         moments=state.moments[used],
         vertex_map=vertex_map,

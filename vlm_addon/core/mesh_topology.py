@@ -13,6 +13,10 @@ from .scene import Float64
 Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
 
+WELD_SHARE = 2.0**-22
+# Side of a cell of the look-up grid, in welding tolerances.
+CELL_TOLERANCES = 8.0
+
 
 @dataclass(frozen=True)
 class HalfEdges:
@@ -114,24 +118,47 @@ def connected_components(count: int, one: Int64, other: Int64) -> tuple[int, Int
 
 
 def weld(positions: Float64, owner: Int64) -> Int64:
-    """(v,) int64: the first vertex with the same position (bit for bit; -0 equals 0) and the same owner.
+    """(v,) int64: for each vertex the first one of the same owner at the same place.
 
-    Files and modifiers split vertices at seams of normals and UVs without moving them, so equality needs no
-    tolerance, and distinct millimetre detail survives in a kilometre scene.
+    Places are the same within WELD_SHARE of the owner's largest extent, some rounding errors of float32 coordinates:
+    files and modifiers split or mirror vertices without moving them further, and millimetre detail survives in a
+    kilometre scene.
     """
-    bits = (np.ascontiguousarray(positions) + 0.0).view(np.uint64)
-    mixed = owner.astype(np.uint64)
+    if not len(positions):
+        return np.zeros(0, np.int64)
+    count = int(owner.max()) + 1
+    low, extent = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, owner, positions)
+    np.maximum.at(extent, owner, positions)
+    extent -= low
+    tolerance = WELD_SHARE * np.maximum(extent.max(axis=1), np.finfo(float).tiny)[owner]
+    place = (positions - low[owner]) / (CELL_TOLERANCES * tolerance)[:, None]
+    vertex, cells = np.arange(len(positions)), np.floor(place).astype(np.int64)
+    near_low = place - cells < 1.0 / CELL_TOLERANCES
     for axis in range(3):
-        mixed = (mixed ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
-        mixed ^= mixed >> np.uint64(29)
-    order = np.argsort(mixed, kind="stable")
-    same = np.zeros(len(order), bool)
-    a, b = order[1:], order[:-1]
-    same[1:] = (owner[a] == owner[b]) & (bits[a] == bits[b]).all(axis=1)
-    first = np.maximum.accumulate(np.where(same, 0, np.arange(len(order))))
-    representative = np.empty(len(order), np.int64)
-    representative[order] = order[first]
-    return representative
+        # A vertex just above a cell's lower face also belongs to the cell below, where its like may lie.
+        twice = near_low[vertex, axis]
+        below = cells[twice]
+        below[:, axis] -= 1
+        vertex, cells = np.concatenate([vertex, vertex[twice]]), np.concatenate([cells, below])
+    hashed = owner[vertex].astype(np.uint64)
+    for axis in range(3):
+        hashed = (hashed ^ cells[:, axis].astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+        hashed ^= hashed >> np.uint64(29)
+    order = np.argsort(hashed, kind="stable")
+    vertex, hashed = vertex[order], hashed[order]
+    starts = np.concatenate([[True], hashed[1:] != hashed[:-1]])
+    first = vertex[np.maximum.accumulate(np.where(starts, np.arange(len(starts)), 0))]
+    before = np.where(starts, vertex, np.roll(vertex, 1))
+    pairs = [(vertex, other) for other in (first, before)]
+    one, other = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    same = (one != other) & (owner[one] == owner[other])
+    one, other = one[same], other[same]
+    same = np.abs(positions[one] - positions[other]).max(axis=1) <= tolerance[one]
+    components, label = connected_components(len(positions), one[same], other[same])
+    representative = np.full(components, -1, np.int64)
+    representative[label[::-1]] = np.arange(len(positions))[::-1]
+    return representative[label]
 
 
 def cut_to_manifold(triangles: Int64, vertex_count: int) -> tuple[Int64, Int64]:

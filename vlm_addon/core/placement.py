@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh_topology import Bool, Int64, Rows, vertex_faces
+from .mesh_topology import Bool, Int64, Rows, sum_by, vertex_faces
 from .scene import Float64
 from .triangle_tree import build_tree
 
@@ -59,6 +59,7 @@ def place_behind(positions: Float64, triangles: Int64, regions: Rows, source_cor
     if not len(triangles):
         return Placement(positions, np.zeros(0, bool), np.zeros(0))
     facing = _facing_regions(positions[triangles], regions, source_corners)
+    towards = _mean_normals(facing, source_corners)
     inset = insets(positions[triangles])
     around = vertex_faces(triangles, len(positions))
     tree = build_tree(positions[triangles])
@@ -71,8 +72,10 @@ def place_behind(positions: Float64, triangles: Int64, regions: Rows, source_cor
         moved = moved + _behind_planes(_normals(corners)[0], wanted, around)
         moved = _shortened(moved, longest)
         moved, hit = _within_thickness(positions, moved, tree.first_hits)
+        # Later rounds may turn the way of a stopped vertex past the edge of what stopped it, but not make it longer.
+        longest[hit] = np.minimum(longest, np.linalg.norm(moved, axis=1))[hit]
         stopped |= hit
-        moved = _without_flips(positions, moved, triangles)
+        moved = _without_flips(positions, moved, triangles, towards)
     depth = intrusions((positions + moved)[triangles], facing, source_corners)
     limited = stopped[triangles].any(axis=1) & (depth > 0)
     return Placement(positions + moved, limited, np.maximum(depth, 0.0))
@@ -130,6 +133,17 @@ def _facing_regions(corners: Float64, regions: Rows, source_corners: Float64) ->
     return Rows(regions.values[keep], starts)
 
 
+def _mean_normals(regions: Rows, source_corners: Float64) -> Float64:
+    """(n, 3) unit: area-weighted mean normal of each region, 0 for an empty one."""
+    corners = source_corners[regions.values]
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    owner = np.repeat(np.arange(len(regions.starts) - 1), regions.lengths)
+    sums = np.stack([sum_by(owner, vectors[:, axis], len(regions.lengths)) for axis in range(3)], axis=1)
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    mean: Float64 = sums / np.where(length > 0, length, 1.0)
+    return mean
+
+
 def _smallest_around(values: Float64, around: Rows) -> Float64:
     least = np.full(len(around.starts) - 1, 0.0)
     filled = around.lengths > 0
@@ -179,14 +193,19 @@ def _within_thickness(positions: Float64, moved: Float64, first_hits: FirstHits)
     return moved, stopped
 
 
-def _without_flips(positions: Float64, moved: Float64, triangles: Int64) -> Float64:
-    """Moves of the vertices of every triangle that would turn over or nearly vanish, halved until none does."""
+def _without_flips(positions: Float64, moved: Float64, triangles: Int64, towards: Float64) -> Float64:
+    """Moves of the vertices of every triangle that would turn over or nearly vanish, halved until none does.
+
+    towards: (n, 3) where the region of each light faces; no light may turn further away from it than at the start.
+    """
     before, area_before = _normals(positions[triangles])
+    facing_before = np.einsum("ij,ij->i", before, towards)
     moved = moved.copy()
     halvings = 0
     while True:
         after, area_after = _normals((positions + moved)[triangles])
         turned = np.einsum("ij,ij->i", before, after) < LEAST_TURN_COSINE
+        turned |= np.einsum("ij,ij->i", after, towards) < np.minimum(LEAST_TURN_COSINE, facing_before)
         bad = (turned | (area_after < LEAST_AREA_SHARE * area_before)) & (area_before > 0)
         bad &= (moved[triangles] != 0).any(axis=(1, 2))
         if not bad.any():

@@ -13,8 +13,8 @@ from .mesh_topology import Bool, Int64
 from .scene import Float64
 from .source_surface import SourceSurface
 
-# Triangles left by the rough reduction for each light asked for: with more the result gets no better (benchmarks/simplify.py),
-# with fewer than some thousands in all, coarse light meshes get worse.
+# Triangles left by the rough reduction for each light asked for: more make the result no better; fewer than some
+# thousands in all make coarse light meshes worse.
 ROUGH_FACTOR = 8
 ROUGH_LEAST = 4000
 # Share of the budget that the least forms of all shells may take before the weakest shells are left out.
@@ -55,7 +55,7 @@ def reduce_surface(surface: SourceSurface, target: int) -> ReducedSurface:
     centre, size = surface.positions[used].mean(axis=0), surface.diagonal
     positions = (start.positions[used] - centre) / size
     power = weight[left] * _areas(positions, triangles)
-    collapsed = collapse_edges(positions, triangles, surface.group[left], power, target)
+    collapsed = collapse_edges(positions, triangles, surface.group[left], power, target, surface.normals[left])
     collapsed = _within_budget(collapsed, surface, left, target)
     number = np.full(len(surface.positions), -1, np.int64)
     number[used] = np.arange(len(used))
@@ -93,7 +93,10 @@ def _strongest_shells(surface: SourceSurface, solid: Bool, target: int) -> Bool:
 
 
 def _within_budget(collapsed: CollapsedMesh, surface: SourceSurface, left: Int64, target: int) -> CollapsedMesh:
-    """Without triangles that have no area and, where still more than `target` are left, without the weakest shells."""
+    """Without triangles that have no area and, where still more than `target` are left, without the weakest shells.
+
+    If even one shell has more than `target`, its largest triangles are kept, which opens it.
+    """
     shell = surface.shell[left[collapsed.source_triangle]]
     solid = _areas(collapsed.positions, collapsed.triangles) > LEAST_AREA
     power = np.bincount(surface.shell, weights=surface.importance())
@@ -102,6 +105,10 @@ def _within_budget(collapsed: CollapsedMesh, surface: SourceSurface, left: Int64
     kept = np.zeros(len(power), bool)
     kept[order[np.cumsum(size[order]) <= max(target, size[order[0]])]] = True
     keep = solid & kept[shell]
+    if keep.sum() > target:
+        area = np.where(keep, _areas(collapsed.positions, collapsed.triangles), -1.0)
+        keep = np.zeros(len(keep), bool)
+        keep[np.argsort(-area, kind="stable")[:target]] = True
     if keep.all():
         return collapsed
     used, triangles = np.unique(collapsed.triangles[keep], return_inverse=True)

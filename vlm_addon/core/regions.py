@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which source triangles each virtual light stands for.
 
-A triangle that survives the collapses stands for itself. Any other goes to the nearest light, in place and in
-direction, among those around the vertices that its own were merged into, and stays within its material group if it
-can. Triangles of a shell that was dropped are adopted by a light nearby, so that their power is kept.
+A triangle that survives the collapses stands for itself unless it was turned over. Any other goes to the nearest
+light, in place and in direction, among those around the vertices that its own were merged into, and stays within its
+material group and on the side it faces if it can. Triangles of a shell that was dropped are adopted by a light
+nearby, so that their power is kept.
 """
 
 from __future__ import annotations
@@ -33,14 +34,15 @@ class Regions:
 
 
 def assign_regions(surface: SourceSurface, reduced: ReducedSurface) -> Regions:
-    """The region of each light; none is empty."""
+    """The region of each light; only one that faces away from everything near it is left without."""
     positions, triangles, source_triangle = reduced.positions, reduced.triangles, reduced.source_triangle
     light_of = np.full(len(surface.triangles), -1, np.int64)
-    light_of[source_triangle] = np.arange(len(triangles))
+    lights = _Lights(positions[triangles], surface.group[source_triangle])
+    alike = np.einsum("ij,ij->i", surface.normals[source_triangle], lights.normals) > 0
+    light_of[source_triangle[alike]] = np.flatnonzero(alike)
     merged = reduced.vertex_map[surface.triangles]
     adopted = (merged < 0).any(axis=1)
     around = vertex_faces(triangles, len(positions))
-    lights = _Lights(positions[triangles], surface.group[source_triangle])
     open_rows = np.flatnonzero((light_of < 0) & ~adopted)
     for first in range(0, len(open_rows), ROWS_PER_BATCH):
         rows = open_rows[first : first + ROWS_PER_BATCH]
@@ -99,12 +101,13 @@ def _nearest_around(surface: SourceSurface, lights: _Lights, rows: Int64, merged
     score = lights.squared_distances(centre[owner], light)
     cosine = np.einsum("ij,ij->i", surface.normals[rows[owner]], lights.normals[light])
     score += (1.0 - cosine) * lights.areas[light]
-    score += np.where(surface.group[rows[owner]] == lights.group[light], 0.0, np.inf)
+    # Rather a light of another direction than one of another group, and rather any than none.
+    score += surface.diagonal**2 * ((cosine <= 0) + 2.0 * (surface.group[rows[owner]] != lights.group[light]))
     return _least(score, owner, light, len(rows))
 
 
 def _least(score: Float64, owner: Int64, choice: Int64, count: int) -> Int64:
-    """The choice of least score of each owner; of the first where all scores are infinite."""
+    """The choice of least score of each owner."""
     # Owners come in a few ascending runs, which the stable sort merges in one go.
     order = np.argsort(owner, kind="stable")
     owner, score = owner[order], score[order]

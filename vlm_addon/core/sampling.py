@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points on the source surface of each virtual light, where phase one measures irradiance (house.md, Definitions).
 
-A light's samples are a Hammersley set of equal weights: one coordinate runs through the area of its source triangles
+A light's samples are a lattice of equal weights: one coordinate runs through the area of its source triangles
 in spatial order, so every part of the region gets its share to within one sample; the other spreads the points
 across a triangle. Normals are the geometric normals of the source triangles, because with them the sum of area times
 irradiance is the flux that the surface truly receives, and no sample looks behind its own triangle.
@@ -42,14 +42,13 @@ def square_to_triangle(x: Float64, y: Float64) -> Float64:
     return np.stack([u, v, 1.0 - u - v], axis=-1)
 
 
-def radical_inverse_base_2(index: Int64) -> Float64:
-    """(n,) in [0, 1): the bits of each index (below 2^32) mirrored at the binary point (van der Corput)."""
-    bits = index.astype(np.uint64)
-    for shift, mask in ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
-        low = np.uint64(mask)
-        step = np.uint64(shift)
-        bits = ((bits & low) << step) | ((bits >> step) & low)
-    return bits.astype(np.float64) / 2.0**32
+def unit_square_points(index: Int64, counts: Int64, group: Int64) -> tuple[Float64, Float64]:
+    """(x, y), each (n,) in [0, 1): point `index` of the `counts` points of a group.
+
+    A rank-1 lattice: x = (i + 1/2) / n, y = i times the golden ratio, so that any run of points is even too, shifted
+    from group to group by the same ratio (Cranley and Patterson 1976).
+    """
+    return (index + 0.5) / counts, (GOLDEN_RATIO * (index + group + 0.5)) % 1.0
 
 
 def sample_regions(corners: Float64, regions: Rows, counts: Int64) -> SourceSamples:
@@ -69,14 +68,13 @@ def sample_regions(corners: Float64, regions: Rows, counts: Int64) -> SourceSamp
     base = cumulative[regions.starts]
     light = np.repeat(np.arange(len(counts)), counts)
     index = np.arange(len(light)) - np.repeat(np.cumsum(counts) - counts, counts)
-    along = (index + 0.5) / counts[light]
+    along, across = unit_square_points(index, counts[light], light)
     at = base[light] + along * (base[light + 1] - base[light])
     slot = np.searchsorted(cumulative, at, side="right") - 1
     slot = np.clip(slot, regions.starts[light], regions.starts[light + 1] - 1)
     x = np.clip((at - cumulative[slot]) / np.maximum(weight[slot], np.finfo(float).tiny), 0.0, 1.0)
-    y = (radical_inverse_base_2(index) + 0.5 / counts[light] + GOLDEN_RATIO * light) % 1.0
     triangle = member[slot]
-    positions = np.einsum("ik,ikj->ij", square_to_triangle(x, y), corners[triangle])
+    positions = np.einsum("ik,ikj->ij", square_to_triangle(x, across), corners[triangle])
     unit = normal[triangle] / np.maximum(double_area[triangle], np.finfo(float).tiny)[:, None]
     return SourceSamples(
         positions=positions,

@@ -69,7 +69,10 @@ def join_surface(meshes: Sequence[Mesh]) -> SourceSurface:
     filled = [mesh for mesh in meshes if len(mesh.triangles)]
     mesh_of = np.repeat(np.arange(len(filled)), [len(mesh.triangles) for mesh in filled])
     positions, triangles = _concatenate(filled)
-    welded = weld(positions, np.repeat(np.arange(len(filled)), [len(mesh.positions) for mesh in filled]))[triangles]
+    owner = np.repeat(np.arange(len(filled)), [len(mesh.positions) for mesh in filled])
+    used, triangles = np.unique(triangles, return_inverse=True)
+    positions, triangles = positions[used], triangles.reshape(-1, 3)
+    welded = weld(positions, owner[used])[triangles]
     a, b, c = welded.T
     original = np.flatnonzero((a != b) & (b != c) & (c != a))
     cut, origin = cut_to_manifold(welded[original], len(positions))

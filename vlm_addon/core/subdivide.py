@@ -10,12 +10,7 @@ import numpy as np
 from .errors import InvalidInput
 from .light_mesh import SourceSamples, VirtualLightMesh
 from .mesh_topology import Int64
-from .sampling import (
-    GOLDEN_RATIO,
-    radical_inverse_base_2,
-    sample_counts,
-    square_to_triangle,
-)
+from .sampling import sample_counts, square_to_triangle, unit_square_points
 from .scene import Float64
 
 # Below this cosine between a light and its source surface a point is not moved along the light's normal.
@@ -82,7 +77,7 @@ def _resampled(corners: Float64, parent: Int64, samples: SourceSamples, samples_
     light = np.repeat(np.arange(len(corners)), counts)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     index = np.arange(len(light)) - offsets[light]
-    x, y = (index + 0.5) / counts[light], (radical_inverse_base_2(index) + GOLDEN_RATIO * light) % 1.0
+    x, y = unit_square_points(index, counts[light], light)
     points = np.einsum("ik,ikj->ij", square_to_triangle(x, y), corners[light])
     normals = unit[light].copy()
     for row in range(len(corners)):

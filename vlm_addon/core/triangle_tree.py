@@ -12,6 +12,10 @@ from .scene import Float64
 
 LEAF_SIZE = 4
 BITS_PER_AXIS = 20
+# A segment that starts on a triangle meets it at 0 up to rounding.
+HIT_START = 1e-6
+# A segment through an edge meets at least one of its triangles, also with rounding.
+EDGE_SLACK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -111,12 +115,9 @@ def _intersections(corners: Float64, origin: Float64, end: Float64, from_behind:
         q = np.cross(t, ab)
         v = np.einsum("ij,ij->i", direction, q) * inverse
         fraction = np.einsum("ij,ij->i", ac, q) * inverse
-        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (fraction > HIT_START) & (fraction <= 1)
+        hit = (u >= -EDGE_SLACK) & (v >= -EDGE_SLACK) & (u + v <= 1 + EDGE_SLACK)
+        hit &= (fraction > HIT_START) & (fraction <= 1)
     if from_behind:
         # determinant = -direction . (ab x ac): negative where the segment leaves through the back of the front.
         hit &= determinant < 0
     return np.where(hit, fraction, np.inf)
-
-
-# A segment that starts on a triangle meets it at 0 up to rounding.
-HIT_START = 1e-6

@@ -22,6 +22,9 @@ LEAST_QUALITY = 1e-6
 # Depth in front of the source surface that counts, as a share of the size (square root of the area) of the light.
 NOTICEABLE_DEPTH = 1e-3
 NOTICEABLE_SHARE = 0.01
+# Mean cosine between a light and its source samples below which it counts as inside out: a light that stands for a
+# small knob may well have a mean about zero, a flipped one has nearly -1.
+INSIDE_OUT_COSINE = -0.3
 
 
 def check_light_mesh(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh] = ()) -> tuple[Finding, ...]:
@@ -100,7 +103,7 @@ def _source_findings(light_mesh: VirtualLightMesh) -> list[Finding]:
     normal = light_mesh.area_vectors / np.where(area > 0, area, 1.0)[:, None]
     weight = samples.weights.astype(np.float64)
     facing = np.bincount(owner, weights=weight * (samples.normals * normal[owner]).sum(axis=1), minlength=len(area))
-    reversed_ = (counts > 0) & (area > 0) & (facing < 0)
+    reversed_ = (counts > 0) & (area > 0) & (facing < INSIDE_OUT_COSINE)
     problem = "their front away from the surface they stand for (mean cosine)"
     _append(found, reversed_, facing, problem, "flip their normals")
     found.extend(_in_front(light_mesh, owner, normal, weight, reversed_))
