@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender.extract import extract_scene
-from vlm_addon.blender.triangle_averages import TextureAverager
+from vlm_addon.blender.triangle_averages import BARYCENTRICS, TextureAverager
 from vlm_addon.core.brdf import diffuse_reflectance
 from vlm_addon.core.scene import NO_TEXTURE, Texture
 
@@ -293,7 +293,7 @@ def test_averages_do_not_miss_thin_stripes():
     pixels[:, ::16] = 1.0
     averager = TextureAverager([Texture("stripes", pixels)])
     uv = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]], np.float32)
-    assert averager.sample(0, uv).mean() == pytest.approx(1.0 / 16.0, rel=0.05)
+    assert averager.sample(0, uv, BARYCENTRICS[4]).mean() == pytest.approx(1.0 / 16.0, rel=0.05)
 
 
 def test_averages_of_small_triangles_are_local():
@@ -301,7 +301,7 @@ def test_averages_of_small_triangles_are_local():
     pixels[:, 32:] = 1.0
     averager = TextureAverager([Texture("halves", pixels)])
     left = np.array([[0.1, 0.1], [0.2, 0.1], [0.1, 0.2]], np.float32)
-    sampled = averager.sample(0, np.stack([left, left + np.float32(0.6)]))
+    sampled = averager.sample(0, np.stack([left, left + np.float32(0.6)]), BARYCENTRICS[4])
     assert sampled[0].max() == 0.0
     assert sampled[1].min() == 1.0
 

@@ -200,6 +200,8 @@ def test_data_images_stay_raw(square, picture):
 @pytest.mark.parametrize("use_alpha", [False, True])
 @pytest.mark.parametrize("mode", ["STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE"])
 def test_alpha_is_associated_as_in_cycles(square, picture, mode, use_alpha, float_buffer):
+    if bpy.app.version >= (5, 2) and mode == ("STRAIGHT" if float_buffer else "PREMUL"):
+        pytest.skip("Cycles 5.2 goes by the mode of a packed image, not by what Blender keeps of it")
     image = picture(alpha=True, float_buffer=float_buffer)
     image.alpha_mode = mode
 
@@ -218,8 +220,8 @@ def test_alpha_is_associated_as_in_cycles(square, picture, mode, use_alpha, floa
         return next(s for s in mix.outputs if s.enabled)
 
     square(build)
-    # Cycles rounds the product of byte images to bytes.
-    assert_as_cycles(tolerance=2e-4 if float_buffer else 0.02)
+    # Cycles rounds the product of byte images to bytes before it divides by alpha again.
+    assert_as_cycles(tolerance=0.02 if use_alpha and not float_buffer else 2e-4)
 
 
 def test_the_alpha_output_is_a_number(square, picture):

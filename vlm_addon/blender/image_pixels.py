@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..core.scene import Float32, Float64
 from .color_space import convert, srgb_to_linear
@@ -37,11 +38,14 @@ def image_pixels(
     stored = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(stored)
     pixels = _four_channels(stored.reshape(height, width, image.channels))
-    pixels = _with_alpha(pixels, image, straight_alpha)
     space = image.colorspace_settings.name
-    if space not in RAW_SPACES:
-        pixels[..., :3] = _linear(pixels[..., :3], image, space, to_rec709, report)
-    return pixels
+    if image.is_float:
+        return _float_pixels(pixels, image, straight_alpha, np.eye(3) if space in RAW_SPACES else to_rec709)
+    if space not in (*RAW_SPACES, *LINEAR_REC709_SPACES, "sRGB"):
+        report(f"image {image.name!r} is in colour space {space!r}", "read as sRGB")
+    levels = np.linspace(0.0, 1.0, 256, dtype=np.float32)
+    decode = levels if space in (*RAW_SPACES, *LINEAR_REC709_SPACES) else srgb_to_linear(levels)
+    return _byte_pixels(np.rint(pixels * 255.0).astype(np.uint8), image, straight_alpha, decode)
 
 
 def _four_channels(stored: Float32) -> Float32:
@@ -58,31 +62,29 @@ def _four_channels(stored: Float32) -> Float32:
     return pixels
 
 
-def _linear(
-    colors: Float32, image: Any, space: str, to_rec709: Float64, report: Callable[[str, str], None]
-) -> np.ndarray:
-    if image.is_float:
-        # Blender converts float images to the working space when it loads them.
-        return convert(colors, to_rec709)
-    if space in LINEAR_REC709_SPACES:
-        return colors
-    if space != "sRGB":
-        report(f"image {image.name!r} is in colour space {space!r}", "read as sRGB")
-    return srgb_to_linear(colors)
-
-
-def _with_alpha(pixels: Float32, image: Any, straight: bool) -> Float32:
-    mode = image.alpha_mode
-    if mode == "NONE" or image.channels in (1, 3):
+def _float_pixels(pixels: Float32, image: Any, straight: bool, to_rec709: Float64) -> Float32:
+    """Blender converts float images to the working space when it loads them, and keeps their alpha premultiplied."""
+    pixels[..., :3] = convert(pixels[..., :3], to_rec709)
+    if _has_no_alpha(image):
         pixels[..., 3] = 1.0
-        return pixels
-    if mode == "CHANNEL_PACKED":
-        return pixels
-    # `pixels` of a byte image hold straight alpha, those of a float image premultiplied alpha. Cycles multiplies the
-    # encoded values of byte images.
-    if image.is_float and straight:
+    elif image.alpha_mode != "CHANNEL_PACKED" and straight:
         alpha = pixels[..., 3:]
         np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)
-    if not image.is_float and not straight:
-        pixels[..., :3] *= pixels[..., 3:]
     return pixels
+
+
+def _byte_pixels(stored: npt.NDArray[np.uint8], image: Any, straight: bool, decode: Float32) -> Float32:
+    """Blender keeps the alpha of byte images straight. Cycles multiplies encoded bytes, and cuts off what is left."""
+    if _has_no_alpha(image):
+        stored[..., 3] = 255
+    elif image.alpha_mode != "CHANNEL_PACKED" and not straight:
+        product = stored[..., :3].astype(np.uint16) * stored[..., 3:]
+        stored[..., :3] = product // 255
+    pixels = np.empty(stored.shape, np.float32)
+    pixels[..., :3] = decode[stored[..., :3]]
+    pixels[..., 3] = stored[..., 3] / np.float32(255.0)
+    return pixels
+
+
+def _has_no_alpha(image: Any) -> bool:
+    return image.alpha_mode == "NONE" or image.channels in (1, 3)

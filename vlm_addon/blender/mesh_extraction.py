@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,19 @@ RAY_VISIBILITY = ("visible_camera", "visible_diffuse", "visible_glossy", "visibl
 DEGENERATE_RATIO = 1e-12
 
 
+@dataclass(frozen=True)
+class _Look:
+    """What instances of one mesh with the same materials share; the fields are those of Mesh."""
+
+    material_indices: Int32
+    corner_uvs: Float32
+    corner_colors: Float32
+    reflectance: Float32
+    emission: Float32
+
+
 class MeshExtractor:
-    """Turns instances into meshes; a mesh shared by instances is read once."""
+    """Turns instances into meshes; what instances share is read and averaged once."""
 
     def __init__(self, materials: MaterialTable, to_rec709: Float64, report: FindingList, depsgraph: Any) -> None:
         self._materials = materials
@@ -31,6 +43,7 @@ class MeshExtractor:
         self._override = depsgraph.view_layer.material_override
         self._averager = TextureAverager(materials.textures)
         self._local: dict[tuple[str, int], LocalMesh] = {}
+        self._looks: dict[tuple[int, tuple[MaterialUse, ...]], _Look] = {}
         self._dynamic: dict[str, bool] = {}
 
     def meshes(self, instance: Any, name: str, matrix: Float64) -> list[Mesh]:
@@ -86,35 +99,38 @@ class MeshExtractor:
 
     def _placed(self, instance: Any, name: str, local: LocalMesh, matrix: Float64) -> Mesh:
         positions, triangles, normals, mirrored = place(local, matrix)
-        uses = self._uses(instance.object)
-        slots = np.clip(local.material_slots, 0, len(uses) - 1)
-        indices = np.array([use.index for use in uses], np.int32)[slots]
-        corner_uvs = self._corner_uvs(local, uses, slots)
-        colors = self._corner_colors(local, uses, slots, name)
-        reflectance, emission = triangle_averages(
-            self._materials.materials, self._averager, indices, corner_uvs, colors
-        )
+        look = self._look(local, self._uses(instance.object), name)
         return Mesh(
             name=name,
             positions=positions,
             triangles=triangles,
             corner_normals=normals,
-            corner_uvs=flipped(corner_uvs) if mirrored else corner_uvs,
-            corner_colors=flipped(colors) if mirrored else colors,
-            material_indices=indices,
+            corner_uvs=flipped(look.corner_uvs) if mirrored else look.corner_uvs,
+            corner_colors=flipped(look.corner_colors) if mirrored else look.corner_colors,
+            material_indices=look.material_indices,
             tag_ids=_tags(instance, local),
-            reflectance=reflectance,
-            emission=emission,
+            reflectance=look.reflectance,
+            emission=look.emission,
             dynamic=self._is_dynamic(instance),
         )
 
-    def _uses(self, blender_object: Any) -> list[MaterialUse]:
-        if self._override is not None:
-            return [self._materials.use(self._override)]
-        materials = [slot.material for slot in blender_object.material_slots]
-        return [self._materials.use(material) for material in materials or [None]]
+    def _look(self, local: LocalMesh, uses: tuple[MaterialUse, ...], name: str) -> _Look:
+        key = (id(local), uses)
+        if key not in self._looks:
+            slots = np.clip(local.material_slots, 0, len(uses) - 1)
+            indices = np.array([use.index for use in uses], np.int32)[slots]
+            uvs, colors = self._corner_uvs(local, uses, slots), self._corner_colors(local, uses, slots, name)
+            averages = triangle_averages(self._materials.materials, self._averager, indices, uvs, colors)
+            self._looks[key] = _Look(indices, uvs, colors, *averages)
+        return self._looks[key]
 
-    def _corner_uvs(self, local: LocalMesh, uses: list[MaterialUse], slots: Int32) -> Float32:
+    def _uses(self, blender_object: Any) -> tuple[MaterialUse, ...]:
+        if self._override is not None:
+            return (self._materials.use(self._override),)
+        materials = [slot.material for slot in blender_object.material_slots]
+        return tuple(self._materials.use(material) for material in materials or [None])
+
+    def _corner_uvs(self, local: LocalMesh, uses: tuple[MaterialUse, ...], slots: Int32) -> Float32:
         """The coordinates that each triangle's material asks for, its mapping applied."""
         result = np.zeros((len(local.triangles), 3, 2), np.float32)
         for slot, use in enumerate(uses):
@@ -128,7 +144,7 @@ class MeshExtractor:
                 result[chosen] = uv[chosen].astype(np.float64) @ matrix[:, :2].T + matrix[:, 2]
         return result
 
-    def _corner_colors(self, local: LocalMesh, uses: list[MaterialUse], slots: Int32, name: str) -> Float32:
+    def _corner_colors(self, local: LocalMesh, uses: tuple[MaterialUse, ...], slots: Int32, name: str) -> Float32:
         if not any(use.color_attribute is not None for use in uses):
             return np.zeros((0, 3, 3), np.float32)
         result = np.ones((len(local.triangles), 3, 3), np.float32)
