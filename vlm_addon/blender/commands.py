@@ -21,12 +21,12 @@ from ..core.settings import describe, from_mapping
 from ..core.simplify import SimplifySettings
 from ..core.validate import check_light_mesh
 from ..render.frame_types import Frame, RenderSettings
-from ..render.technique import technique_list
+from ..render.technique import technique_by_name, technique_list
 from ..terminal import TerminalProgress, table
 from .authoring import NAME
 from .availability import light_mesh_objects
 from .extract import ExtractOptions, require_camera, require_lights
-from .image_io import require_format, write_image
+from .image_io import require_format, require_view, write_image
 from .light_mesh_io import Extraction, extract
 from .names import SOURCES_PROPERTY
 from .render_process import KEPT
@@ -88,11 +88,15 @@ def _bake_summary(made: Bake) -> str:
 def render_command(arguments: Namespace) -> None:
     """`render`: writes one picture, its buffers and a report."""
     settings = _setting_texts(arguments.set)
+    technique = technique_by_name(arguments.technique)
+    from_mapping(technique.settings, settings, f"technique {technique.name!r}")
     require_format(arguments.out)
     _require_apart(arguments.scene, [path for path in (arguments.out, arguments.json) if path is not None])
     opened, found = _open(arguments)
     require_camera(found.snapshot)
     require_lights(found.snapshot)
+    if arguments.view is not None:
+        require_view(arguments.view)
     width, height = arguments.size or _scene_size()
     frame_settings = RenderSettings(
         width,

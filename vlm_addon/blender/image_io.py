@@ -56,6 +56,12 @@ def read_image(path: Path | str) -> Float32:
     return image_of(channels, names=names)
 
 
+def require_view(view: str, scene: Any = None) -> None:
+    """Raises InvalidInput unless the scene's display has a view transform of that name."""
+    with _view(scene or bpy.context.scene, view):
+        pass
+
+
 def view_transforms(scene: Any = None) -> list[str]:
     """Names of the view transforms that the scene's display offers."""
     settings = (scene or bpy.context.scene).view_settings

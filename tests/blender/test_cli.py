@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: what it writes, its exit codes, and one line for everything that can be wrong."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from vlm_addon.blender.image_io import read_image
+from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.scene_file import open_scene
+from vlm_addon.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def save(tmp_path):
+    def save(name="scene.blend"):
+        path = tmp_path / name
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        return path
+
+    return save
+
+
+@pytest.fixture
+def lit_room(make_cube, make_light, make_camera, save):
+    """A cube under a lamp before a camera, saved."""
+    make_cube()
+    make_light(location=(0.0, 0.0, 4.0))
+    make_camera(location=(0.0, 0.0, 8.0))
+    return save()
+
+
+def run(capsys, *arguments):
+    """(exit code, lines on standard error)"""
+    code = main([str(argument) for argument in arguments])
+    return code, capsys.readouterr().err.strip().splitlines()
+
+
+def others(folder, *known):
+    return sorted(path.name for path in folder.iterdir() if path not in known)
+
+
+def test_bake_writes_the_scene_with_its_lights_and_a_report(lit_room, tmp_path, capsys):
+    baked, report = tmp_path / "baked.blend", tmp_path / "report.json"
+    before = lit_room.read_bytes()
+    code, _ = run(capsys, "bake", lit_room, "--triangles", 12, "--save", baked, "--json", report)
+    assert code == 0
+    assert lit_room.read_bytes() == before
+    written = json.loads(report.read_text())
+    open_scene(baked)
+    assert len(extract().light_mesh) == written["lights"] == 12
+    assert written["reflected_power_m2"] == pytest.approx(written["source_reflected_power_m2"], rel=0.01)
+
+
+def test_baking_again_with_another_budget_replaces_what_was_made(lit_room, tmp_path, capsys):
+    first, second = tmp_path / "first.blend", tmp_path / "second.blend"
+    run(capsys, "bake", lit_room, "--triangles", 12, "--save", first)
+    assert run(capsys, "bake", first, "--triangles", 4, "--save", second)[0] == 0
+    open_scene(second)
+    assert len(extract().light_mesh) <= 4
+
+
+def test_a_light_mesh_drawn_by_hand_is_kept(tmp_path, capsys):
+    cornell, report = ROOT / "sample_blends" / "cornell_box.blend", tmp_path / "report.json"
+    assert run(capsys, "bake", cornell, "--triangles", 9, "--json", report)[0] == 0
+    written = json.loads(report.read_text())
+    assert (written["lights"], written["created"]) == (44, False)
+    assert "drawn by hand" in written["findings"][0]
+
+
+def test_render_writes_a_lit_picture_and_its_times(lit_room, tmp_path, capsys):
+    image, report = tmp_path / "picture.exr", tmp_path / "report.json"
+    code, _ = run(
+        capsys, "render", lit_room, "--technique", "direct", "--size", "24x16", "--samples", 2, "--out", image,
+        "--json", report, "--buffers", tmp_path / "buffers",
+    )  # fmt: skip
+    assert code == 0
+    picture = read_image(image)
+    assert picture.shape == (16, 24, 4)
+    assert picture[8, 12, :3].min() > 0.01
+    assert {"G-buffer", "direct light"} <= {name for name, _ in json.loads(report.read_text())["milliseconds"]}
+    depth = read_image(tmp_path / "buffers" / "depth.exr")
+    assert depth[8, 12, 0] == pytest.approx(7.0, rel=1e-3)
+
+
+def test_check_of_a_sound_light_mesh_is_silent_and_of_none_is_a_finding(lit_room, tmp_path, capsys):
+    baked = tmp_path / "baked.blend"
+    run(capsys, "bake", lit_room, "--triangles", 12, "--save", baked)
+    assert run(capsys, "check", baked)[0] == 0
+    report = tmp_path / "check.json"
+    assert run(capsys, "check", lit_room, "--json", report)[0] == 3
+    assert len(json.loads(report.read_text())["findings"]) == 1
+
+
+def test_techniques_lists_each_with_its_settings(tmp_path, capsys):
+    report = tmp_path / "techniques.json"
+    assert run(capsys, "techniques", "--json", report)[0] == 0
+    listed = json.loads(report.read_text())["techniques"]
+    assert {"direct", "vlm"} <= {technique["name"] for technique in listed}
+
+
+BAD_OPTIONS = {
+    "no file": (["bake", "{folder}/nope.blend", "--save", "{folder}/o.blend"], "there is no such file"),
+    "zero triangles": (["bake", "{scene}", "--triangles", "0", "--save", "{folder}/o.blend"], "at least 1"),
+    "negative triangles": (["bake", "{scene}", "--triangles", "-5", "--save", "{folder}/o.blend"], "at least 1"),
+    "nothing to write": (["bake", "{scene}"], "name --save"),
+    "no folder": (["bake", "{scene}", "--save", "{folder}/no/o.blend"], "its folder does not exist"),
+    "onto the source": (["bake", "{scene}", "--save", "{scene}"], "the source is never changed"),
+    "unknown technique": (["render", "{scene}", "--technique", "x", "--out", "{folder}/o.png"], "use one of: direct"),
+    "unknown format": (["render", "{scene}", "--technique", "direct", "--out", "{folder}/o.gif"], ".exr or .png"),
+    "unknown setting": (
+        ["render", "{scene}", "--technique", "direct", "--set", "a=1", "--out", "{folder}/o.png"], "no such setting"),
+    "malformed setting": (
+        ["render", "{scene}", "--technique", "direct", "--set", "a", "--out", "{folder}/o.png"], "KEY=VALUE"),
+    "no samples": (
+        ["render", "{scene}", "--technique", "direct", "--samples", "0", "--out", "{folder}/o.png"], "give 1 to"),
+    "no size": (
+        ["render", "{scene}", "--technique", "direct", "--size", "0x9", "--out", "{folder}/o.png"], "give 1 to"),
+    "no light mesh": (["render", "{scene}", "--technique", "vlm", "--out", "{folder}/o.png"], "bake"),
+    "unknown camera": (["check", "{scene}", "--camera", "x"], "camera 'x'"),
+    "unknown scene": (["check", "{scene}", "--scene", "x"], "scene 'x'"),
+    "unknown view layer": (["check", "{scene}", "--view-layer", "x"], "view layer 'x'"),
+    "unknown view": (
+        ["render", "{scene}", "--technique", "direct", "--size", "8x8", "--view", "x", "--out", "{folder}/o.png"],
+        "view transform 'x'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD_OPTIONS)
+def test_bad_options_are_one_line_and_exit_2(name, lit_room, tmp_path, capsys):
+    arguments, says = BAD_OPTIONS[name]
+    filled = [argument.format(scene=lit_room, folder=tmp_path) for argument in arguments]
+    code, errors = run(capsys, *filled)
+    assert code == 2
+    assert len(errors) == 1
+    assert says in errors[0]
+    assert others(tmp_path, lit_room) == []
+
+
+def empty_mesh(make):
+    make("bad", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [])
+
+
+def nan_mesh(make):
+    make("bad", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]).data.vertices[1].co.x = float("nan")
+
+
+def flat_object(make):
+    make("bad", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]).scale = (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("break_it", [empty_mesh, nan_mesh, flat_object])
+@pytest.mark.parametrize("command", ["bake", "render", "check"])
+def test_geometry_that_cannot_be_lit_names_its_object(break_it, command, make_mesh, make_cube, make_light, make_camera,
+                                                      save, tmp_path, capsys):  # fmt: skip
+    make_cube()
+    make_light()
+    make_camera()
+    break_it(make_mesh)
+    scene = save()
+    output = {"bake": ["--save", tmp_path / "o.blend"], "check": [],
+              "render": ["--technique", "direct", "--size", "8x8", "--out", tmp_path / "o.png"]}  # fmt: skip
+    code, errors = run(capsys, command, scene, *output[command])
+    assert (code, len(errors)) == (2, 1)
+    assert "'bad'" in errors[0]
+    assert others(tmp_path, scene) == []
+
+
+def test_a_scene_without_lights_or_camera_says_what_to_add(make_cube, make_light, make_camera, save, tmp_path, capsys):
+    make_cube()
+    dark = save("dark.blend")
+    options = ["--technique", "direct", "--size", "8x8", "--out", tmp_path / "o.png"]
+    assert "add one (Add > Camera)" in run(capsys, "render", dark, *options)[1][0]
+    make_camera()
+    code, errors = run(capsys, "render", save("seen.blend"), *options)
+    assert (code, len(errors)) == (2, 1)
+    assert "add a light" in errors[0]
+
+
+def test_a_scene_without_surfaces_cannot_be_baked(make_light, save, tmp_path, capsys):
+    make_light()
+    code, errors = run(capsys, "bake", save(), "--save", tmp_path / "o.blend")
+    assert (code, len(errors)) == (2, 1)
+    assert "add a mesh" in errors[0]
+
+
+@pytest.mark.skipif(os.getuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_takes_no_file_is_named(lit_room, tmp_path, capsys):
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o500)
+    assert run(capsys, "bake", lit_room, "--save", closed / "o.blend")[0] == 2
+
+
+def test_the_module_runs_as_a_program(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "vlm_addon", "techniques"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0
+    assert "vlm: " in done.stdout
+    usage = subprocess.run([sys.executable, "-m", "vlm_addon", "paint"], cwd=ROOT, capture_output=True, check=False)
+    assert usage.returncode == 2
+
+
+def test_the_view_transform_changes_the_png_only(lit_room, tmp_path, capsys):
+    from PIL import Image
+
+    pictures = []
+    for view in ("Standard", "Raw"):
+        path = tmp_path / f"{view}.png"
+        options = ["--technique", "direct", "--size", "16x16", "--samples", 1, "--out", path, "--view", view]
+        assert run(capsys, "render", lit_room, *options)[0] == 0
+        pictures.append(np.asarray(Image.open(path).convert("RGB"), float))
+    assert pictures[0].mean() > pictures[1].mean() + 1.0
