@@ -34,13 +34,15 @@ class Device:
     def __init__(self) -> None:
         """Opens the context. Raises DeviceError that names what was tried and what to install."""
         self.context = _open_context()
-        # Dead wrappers are released in `_current`, where this context is bound: never while another one is.
+        # Dead wrappers are released in `current`, where this context is bound: never while another one is.
         self.context.gc_mode = "context_gc"
         self._thread = threading.get_ident()
         self._closed = False
         self.name: str = self.context.info["GL_RENDERER"]
         self.is_software = any(word in self.name.lower() for word in SOFTWARE_RENDERERS)
         self.shaders = ShaderLibrary(self.context)
+        # moderngl never deletes a query, so frames share them.
+        self._queries: list[Any] = []
 
     def __enter__(self) -> Device:
         return self
@@ -94,8 +96,8 @@ class Device:
             return render_frame(self, snapshot, light_mesh, settings, progress)
 
     def timer(self) -> PassTimer:
-        """A timer of passes that suits this device."""
-        return PassTimer(self.context, self.is_software)
+        """A timer of passes that suits this device; valid until the next one is made."""
+        return PassTimer(self.context, self.is_software, self._queries)
 
 
 class PassTimer:
@@ -104,11 +106,14 @@ class PassTimer:
     Timer queries count a small part of a software renderer's work, so there a fence and the wall clock are used.
     """
 
-    def __init__(self, context: moderngl.Context, is_software: bool) -> None:
+    def __init__(self, context: moderngl.Context, is_software: bool, queries: list[Any]) -> None:
+        """queries: those to use first; new ones are added to it."""
         self._context = context
         self._is_software = is_software
         self._milliseconds: dict[str, float] = {}
-        self._queries: list[tuple[str, Any]] = []
+        self._queries = queries
+        self._measured: list[str] = []
+        self._read = 0
 
     @property
     def kind(self) -> str:
@@ -120,10 +125,11 @@ class PassTimer:
         """Adds the GPU time of the block to pass `name`."""
         self._milliseconds.setdefault(name, 0.0)
         if not self._is_software:
-            query = self._context.query(time=True)
-            with query:
+            if len(self._measured) == len(self._queries):
+                self._queries.append(self._context.query(time=True))
+            with self._queries[len(self._measured)]:
                 yield
-            self._queries.append((name, query))
+            self._measured.append(name)
             return
         self._context.finish()
         start = time.perf_counter()
@@ -133,9 +139,9 @@ class PassTimer:
 
     def timings(self) -> list[tuple[str, float]]:
         """(pass name, milliseconds) of all that was measured; waits for the GPU."""
-        for name, query in self._queries:
-            self._milliseconds[name] += 1e-6 * query.elapsed
-        self._queries.clear()
+        for index in range(self._read, len(self._measured)):
+            self._milliseconds[self._measured[index]] += 1e-6 * self._queries[index].elapsed
+        self._read = len(self._measured)
         return list(self._milliseconds.items())
 
 
