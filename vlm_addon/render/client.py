@@ -45,9 +45,7 @@ SHUTDOWN_S = 3.0
 class RenderProcess:
     """A renderer in a process of its own; a context manager. One picture at a time."""
 
-    def __init__(
-        self, executable: Path | str, search_paths: Sequence[Path | str], silence_limit_s: float = SILENCE_LIMIT_S
-    ) -> None:
+    def __init__(self, executable: Path | str, search_paths: Sequence[Path | str]) -> None:
         """Starts the child. search_paths: folders that hold vlm_addon, numpy, moderngl and glcontext.
 
         Raises DeviceError where there is no Python to start.
@@ -55,7 +53,7 @@ class RenderProcess:
         if not executable:
             raise DeviceError("the renderer needs a Python to run in, and sys.executable names none")
         self._folder = Path(tempfile.mkdtemp(prefix="vlm_render_"))
-        self._silence_limit_s = silence_limit_s
+        self._silence_limit_s = SILENCE_LIMIT_S
         self._greeted = False
         self._number = 0
         paths = json.dumps([str(path) for path in search_paths])
