@@ -121,7 +121,6 @@ def room():
     walls.display_type = "WIRE"
     bpy.data.objects["Light"].location = (1.0, -2.0, 4.5)
     scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = 480, 270
     scene.vlm.samples = 2
 
 
@@ -138,6 +137,7 @@ def story():
     yield SECONDS_FOR_REDRAW
     look("1_default_file")
 
+    bpy.context.scene.render.resolution_percentage = 25  # a software renderer would need minutes for all pixels
     with in_view():
         STORY["first button"] = sorted(bpy.ops.vlm.light_scene("INVOKE_DEFAULT"))
     yield from until(there_is_a_light_mesh)
@@ -194,7 +194,7 @@ def story():
     bpy.context.object.display_type = "BOUNDS"
     with in_view():
         STORY["long work"] = sorted(bpy.ops.vlm.create_from_selection("INVOKE_DEFAULT", target_triangles=100))
-    yield 4 * SECONDS_FOR_REDRAW
+    yield 8 * SECONDS_FOR_REDRAW
     STORY["ran at Esc"] = not nothing_runs()
     look("8_progress")
     press("ESC")
