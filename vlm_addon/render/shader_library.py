@@ -22,11 +22,14 @@ if TYPE_CHECKING:
 
 SHADER_ROOT = Path(__file__).resolve().parents[2] / "gpu_shaders"
 GLSL_VERSION = 430
+# Lines of the nth file of a source are numbered from n times this: drivers forget the source number that `#line`
+# may carry (Mesa for undeclared names), never the line.
+LINES_PER_FILE = 10_000
 LAYOUT_PREFIX = "gpu_layout/"
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"\s*$')
 # "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (Intel, Apple, ANGLE)
-_LOCATION = re.compile(r"(?<![\w.])(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")
+_LOCATION = re.compile(r"(?<![\w.])\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")
 
 Built = TypeVar("Built")
 Defines = Mapping[str, int | float | bool | str]
@@ -67,12 +70,12 @@ class ShaderLibrary:
         return self._programs[key]
 
     def expand(self, text: str, name: str, defines: Defines | None = None) -> tuple[str, list[str]]:
-        """Complete GLSL source of `text`, and the file names that its `#line` directives number."""
+        """Complete GLSL source of `text`, and its files in the order of their line numbers' thousands."""
         files = [name]
         lines = [f"#version {GLSL_VERSION} core"]
         constants: Defines = {**gpu_layout.CONSTANTS, **(defines or {})}
         lines += [f"#define {key} {_literal(value)}" for key, value in sorted(constants.items())]
-        lines += ["#line 1 0", *self._expanded_lines(text, 0, files, set())]
+        lines += ["#line 1", *self._expanded_lines(text, 0, files, set())]
         return "\n".join(lines) + "\n", files
 
     def _expanded_lines(self, text: str, file_index: int, files: list[str], included: set[str]) -> list[str]:
@@ -90,8 +93,8 @@ class ShaderLibrary:
             files.append(path)
             index = len(files) - 1
             body = self._read(path, f"{files[file_index]}:{number}")
-            lines += [f"#line 1 {index}", *self._expanded_lines(body, index, files, included)]
-            lines.append(f"#line {number + 1} {file_index}")
+            lines += [f"#line {index * LINES_PER_FILE + 1}", *self._expanded_lines(body, index, files, included)]
+            lines.append(f"#line {file_index * LINES_PER_FILE + number + 1}")
         return lines
 
     def _read(self, path: str, where: str) -> str:
@@ -133,10 +136,10 @@ def set_uniforms(program: moderngl.Program | moderngl.ComputeShader, values: Map
 
 
 def named_locations(message: str, files: list[str]) -> str:
-    """A driver's message with `source:line` written as `file:line`, on one line for each error."""
+    """A driver's message in one line, each `source:line` in it written as `file:line`."""
 
     def name(match: re.Match[str]) -> str:
-        index, line = int(match.group(1)), match.group(2) or match.group(3)
+        index, line = divmod(int(match.group(1) or match.group(2)), LINES_PER_FILE)
         return f"{files[index]}:{line}:" if index < len(files) else match.group(0)
 
     lines = [line.strip() for line in message.splitlines()]
