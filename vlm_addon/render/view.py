@@ -79,6 +79,7 @@ def _require_usable(camera: Camera) -> None:
     if not camera.clip_end > camera.clip_start:
         problem = f"clip end {camera.clip_end} m is not beyond clip start {camera.clip_start} m"
         raise InvalidInput(subject, problem, "give a larger clip end")
-    extent = camera.ortho_scale if camera.kind == ORTHOGRAPHIC else camera.sensor_width / camera.lens
-    if not (np.isfinite(extent) and extent > 0.0):
+    is_orthographic = camera.kind == ORTHOGRAPHIC
+    sizes = (camera.ortho_scale,) if is_orthographic else (camera.lens, camera.sensor_width, camera.sensor_height)
+    if not all(0.0 < size < np.inf for size in sizes):
         raise InvalidInput(subject, "its picture has no width", "give lens, sensor and scale above 0")
