@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Irradiance from virtual lights against the float64 form factor, pixel by pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.render.rooms import lights_from_triangles
+from vlm_addon.core.errors import Cancelled
+from vlm_addon.core.form_factor import polygon_form_factor
+from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
+from vlm_addon.core.progress import Progress, silent
+from vlm_addon.core.scene import Float32, Float64
+from vlm_addon.render.device import Device
+from vlm_addon.render.passes import phase_two
+from vlm_addon.render.passes.accumulate import read_image
+from vlm_addon.render.passes.gbuffer import GBuffer
+from vlm_addon.render.passes.phase_two import PhaseTwoPass
+from vlm_addon.render.virtual_lights import GpuVirtualLights
+
+SIZE = (21, 37)
+"""Divides by no size of group."""
+
+
+class Pixels:
+    """Random surface points, one a pixel, row 0 at the top; a fifth of the pixels shows nothing."""
+
+    def __init__(self, generator: np.random.Generator, size: tuple[int, int] = SIZE) -> None:
+        shape = (size[1], size[0])
+        self.positions = generator.uniform(-1.0, 1.0, (*shape, 3)).astype(np.float32)
+        normals = generator.normal(size=(*shape, 3))
+        self.normals = (normals / np.linalg.norm(normals, axis=2, keepdims=True)).astype(np.float32)
+        self.tag_ids = generator.integers(0, 4, shape).astype(np.int32)
+        self.shown = generator.random(shape) < 0.8
+
+    def flat(self) -> tuple[Float64, Float64]:
+        """Positions and unit normals of all pixels, (p, 3) float64."""
+        normals = self.normals.reshape(-1, 3).astype(float)
+        return self.positions.reshape(-1, 3).astype(float), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def irradiance(
+    device: Device,
+    pixels: Pixels,
+    lights: VirtualLightMesh,
+    radiosity: Float32,
+    origin: Float64 | None = None,
+    progress: Progress = silent,
+) -> Float32:
+    """(h, w, 4) of the pass, row 0 at the top."""
+    height, width = pixels.shown.shape
+    with device.current() as context:
+
+        def upload(values: np.ndarray) -> np.ndarray:
+            image = np.zeros((height, width, 4), values.dtype)
+            image[..., : values.shape[2]] = np.where(pixels.shown[..., None], values, 0)
+            kind = "i4" if values.dtype == np.int32 else "f4"
+            return context.texture((width, height), 4, image[::-1].tobytes(), dtype=kind)
+
+        ids = np.stack([np.zeros_like(pixels.tag_ids), pixels.tag_ids], axis=2)
+        normal, position = upload(pixels.normals), upload(pixels.positions)
+        gbuffer = GBuffer(position, normal, normal, position, position, upload(ids))
+        rows = np.zeros((max(len(lights), 1), 4), np.float32)
+        rows[: len(lights), :3] = radiosity
+        buffer = context.buffer(rows.tobytes())
+        records = GpuVirtualLights(context, lights, np.zeros(3) if origin is None else origin)
+        return read_image(
+            PhaseTwoPass(context, device.shaders, width, height).render(gbuffer, records, buffer, progress)
+        )
+
+
+def expected(pixels: Pixels, lights: VirtualLightMesh, radiosity: Float32) -> Float64:
+    """(h, w, 3): the sum in float64."""
+    positions, normals = pixels.flat()
+    factors = polygon_form_factor(positions, normals, lights.corners)
+    tags = pixels.tag_ids.reshape(-1, 1)
+    factors = np.where((tags == lights.tag_ids) & (lights.tag_ids != 0), 0.0, factors)
+    total = (factors @ radiosity.astype(float)).reshape(*pixels.shown.shape, 3)
+    return np.where(pixels.shown[..., None], total, 0.0)
+
+
+def random_lights(generator: np.random.Generator, count: int, size: float, spread: float = 1.5) -> VirtualLightMesh:
+    centres = generator.uniform(-spread, spread, (count, 1, 3))
+    corners = (centres + generator.normal(0.0, size, (count, 3, 3))).astype(np.float32)
+    return lights_from_triangles(corners, tag_ids=generator.integers(0, 4, count))
+
+
+@pytest.mark.parametrize("size", [1.0, 0.2, 0.02], ids=["large", "middle", "small and far"])
+def test_random_lights_give_what_the_closed_form_gives(device: Device, size: float) -> None:
+    generator = np.random.default_rng(int(100 * size))
+    pixels, lights = Pixels(generator), random_lights(generator, 150, size)
+    radiosity = generator.uniform(0.0, 10.0, (150, 3)).astype(np.float32)
+    truth = expected(pixels, lights, radiosity)
+    found = irradiance(device, pixels, lights, radiosity)[..., :3]
+    assert found == pytest.approx(truth, rel=2e-4, abs=2e-5 * truth.max())
+
+
+def test_surfaces_in_groups_of_one_direction_give_the_same(device: Device) -> None:
+    """Neighbouring pixels of one flat surface, where a whole group may treat a light alike."""
+    generator = np.random.default_rng(4)
+    pixels, lights = Pixels(generator, (64, 64)), random_lights(generator, 200, 0.1)
+    grid = np.linspace(-1.0, 1.0, 64, dtype=np.float32)
+    pixels.positions[..., 0], pixels.positions[..., 1] = np.meshgrid(grid, grid)
+    pixels.positions[..., 2] = 0.0
+    pixels.normals[...] = (0.0, 0.0, 1.0)
+    pixels.shown[...] = True
+    radiosity = generator.uniform(0.0, 10.0, (200, 3)).astype(np.float32)
+    truth = expected(pixels, lights, radiosity)
+    found = irradiance(device, pixels, lights, radiosity)[..., :3]
+    assert found == pytest.approx(truth, rel=2e-4, abs=2e-5 * truth.max())
+
+
+def test_pixels_without_surface_stay_zero(device: Device) -> None:
+    generator = np.random.default_rng(1)
+    pixels, lights = Pixels(generator), random_lights(generator, 20, 0.5)
+    found = irradiance(device, pixels, lights, np.ones((20, 3), np.float32))
+    assert (found[~pixels.shown] == 0.0).all()
+    assert (found[pixels.shown][:, :3].max(axis=0) > 0.0).all()
+
+
+def test_a_tag_leaves_out_its_own_surfaces_and_no_others(device: Device) -> None:
+    """One light over surfaces of the tags 0 to 3 that all see it alike."""
+    generator = np.random.default_rng(2)
+    pixels = Pixels(generator)
+    pixels.positions[...] = 0.0
+    pixels.normals[...] = (0.0, 0.0, 1.0)
+    pixels.shown[...] = True
+    corners = [[[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]]]
+    for tag_id in (0, 1, 2):
+        found = irradiance(device, pixels, lights_from_triangles(corners, tag_ids=tag_id), np.ones((1, 3), np.float32))
+        excluded = (pixels.tag_ids == tag_id) & (tag_id != 0)
+        assert (found[excluded][:, 0] == 0.0).all()
+        assert (found[~excluded][:, 0] > 0.05).all()
+
+
+def test_no_lights_give_no_light(device: Device) -> None:
+    pixels = Pixels(np.random.default_rng(3))
+    assert (irradiance(device, pixels, empty_light_mesh(), np.zeros((0, 3), np.float32)) == 0.0).all()
+
+
+def test_the_split_into_dispatches_does_not_show(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    generator = np.random.default_rng(5)
+    count = phase_two.MIN_LIGHTS_PER_DISPATCH * 3 + 7
+    pixels, lights = Pixels(generator), random_lights(generator, count, 0.1)
+    radiosity = generator.uniform(0.0, 10.0, (count, 3)).astype(np.float32)
+    whole = irradiance(device, pixels, lights, radiosity)
+    monkeypatch.setattr(phase_two, "EVALUATIONS_PER_DISPATCH", 1)
+    calls: list[float] = []
+    split = irradiance(device, pixels, lights, radiosity, progress=lambda f, label: calls.append(f) is None)
+    assert len(calls) == 4
+    assert calls[-1] == 1.0
+    assert split == pytest.approx(whole, rel=1e-5, abs=1e-5)
+
+
+def test_the_work_can_be_cancelled_between_dispatches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(phase_two, "EVALUATIONS_PER_DISPATCH", 1)
+    generator = np.random.default_rng(6)
+    count = phase_two.MIN_LIGHTS_PER_DISPATCH * 3
+    calls: list[float] = []
+
+    def second_time(fraction: float, label: str) -> bool:
+        calls.append(fraction)
+        return len(calls) < 2
+
+    with pytest.raises(Cancelled):
+        irradiance(
+            device,
+            Pixels(generator),
+            random_lights(generator, count, 0.1),
+            np.ones((count, 3), np.float32),
+            progress=second_time,
+        )
+    assert len(calls) == 2
+
+
+def test_lights_are_rounded_only_after_the_local_origin_is_taken_off(device: Device) -> None:
+    generator = np.random.default_rng(7)
+    pixels = Pixels(generator)
+    corners = (
+        (generator.uniform(-1, 1, (30, 1, 3)) + generator.normal(0, 0.2, (30, 3, 3))).astype(np.float32).astype(float)
+    )
+    origin = np.array([81920.5, -40960.25, 1024.125])
+    radiosity = np.ones((30, 3), np.float32)
+    near = irradiance(device, pixels, lights_from_triangles(corners), radiosity)
+    far = irradiance(device, pixels, lights_from_triangles(corners + origin), radiosity, origin)
+    assert far == pytest.approx(near, abs=1e-6)
+
+
+def test_bright_lights_neither_overflow_nor_lose_their_hue(device: Device) -> None:
+    pixels = Pixels(np.random.default_rng(8))
+    lights = random_lights(np.random.default_rng(9), 5, 0.5)
+    radiosity = np.tile(np.float32([1e6, 1.0, 1e-6]), (5, 1))
+    found = irradiance(device, pixels, lights, radiosity)[..., :3]
+    assert np.isfinite(found).all()
+    scale = radiosity.max(axis=0)
+    assert found / scale == pytest.approx(expected(pixels, lights, radiosity) / scale, rel=1e-3, abs=1e-6)
+
+
+def test_the_same_input_gives_the_same_bits(device: Device) -> None:
+    generator = np.random.default_rng(10)
+    pixels, lights = Pixels(generator), random_lights(generator, 300, 0.1)
+    radiosity = np.ones((300, 3), np.float32)
+    first = irradiance(device, pixels, lights, radiosity)
+    assert (first == irradiance(device, pixels, lights, radiosity)).all()
