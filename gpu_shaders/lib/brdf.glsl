@@ -7,6 +7,8 @@
 #define INVERSE_PI 0.318309886183791
 // Roughness below which a lobe is a mirror that lamps do not show in; keeps float32 finite.
 #define LEAST_ALPHA 1e-4
+// Variance of half vectors over a small light, per steradian, as an addition to alpha squared.
+#define LIGHT_SPREAD 0.1
 // Blender's own bound, so that the index of refraction stays finite.
 #define MAX_F0 0.99
 
@@ -84,6 +86,11 @@ Reflector make_reflector(Surface surface, vec3 to_view, sampler3D albedo_table) 
         surface.base_color * (dielectric * max(1.0 - layer_albedo, 0.0)), metal_f0, surface.metallic * metal_gain,
         dielectric * gain, ior, max(surface.roughness * surface.roughness, LEAST_ALPHA)
     );
+}
+
+// Roughness squared of a lobe that a light of some solid angle (sr) blurs as much as its half vectors spread. 0 stays 0.
+float widened_alpha(float alpha, float solid_angle) {
+    return alpha == 0.0 ? 0.0 : min(sqrt(alpha * alpha + LIGHT_SPREAD * solid_angle), 1.0);
 }
 
 // GGX lobe with height-correlated Smith shadowing (Heitz 2014), without Fresnel, times the cosine of the light.

@@ -14,6 +14,7 @@
 struct LampRay {
     vec3 direction;     // unit, to the lamp's sample point
     vec3 irradiance;    // W/m², on a surface that faces the sample point
+    float solid_angle;  // sr, of the part of the lamp that the sample stands for
 };
 
 // atan(y / x) for y >= 0, in [0, pi]; drivers' own are off by 1e-4.
@@ -113,8 +114,9 @@ float cell_form_factor(Lamp lamp, vec3 p, vec3 n) {
 
 // Direction to the sample point of a lamp and what it brings to a surface that faces it.
 LampRay lamp_ray(Lamp lamp, vec3 p) {
+    float disk = FORM_FACTOR_PI * lamp.sample_weight;
     if (lamp.kind == LAMP_SUN) {
-        return LampRay(lamp.sample_position, lamp.intensity);
+        return LampRay(lamp.sample_position, lamp.intensity, disk * lamp.radius * lamp.radius);
     }
     vec3 to_sample = lamp.sample_position - p;
     float distance_squared = max(dot(to_sample, to_sample), 1e-30);
@@ -122,12 +124,14 @@ LampRay lamp_ray(Lamp lamp, vec3 p) {
     if (lamp.kind == LAMP_AREA) {
         // The solid angle of a small piece, bounded where the point touches it.
         float facing = max(dot(lamp.z_axis, direction), 0.0) * lamp.cell_area;
-        return LampRay(direction, lamp.intensity * (facing / (FORM_FACTOR_PI * distance_squared + facing)));
+        float share = facing / (FORM_FACTOR_PI * distance_squared + facing);
+        return LampRay(direction, lamp.intensity * share, FORM_FACTOR_PI * share);
     }
     vec3 to_centre = lamp.position - p;
-    float reach = max(dot(to_centre, to_centre) + lamp.falloff_radius_squared, lamp.radius * lamp.radius);
+    float radius_squared = lamp.radius * lamp.radius;
+    float reach = max(max(dot(to_centre, to_centre) + lamp.falloff_radius_squared, radius_squared), 1e-30);
     float attenuation = lamp.kind == LAMP_SPOT ? spot_attenuation(lamp, -direction) : 1.0;
-    return LampRay(direction, lamp.intensity * (attenuation / max(reach, 1e-30)));
+    return LampRay(direction, lamp.intensity * (attenuation / reach), disk * radius_squared / reach);
 }
 
 // Irradiance in W/m² at p with unit normal n, without shadows; averaged over the samples of a lamp it is exact.

@@ -11,6 +11,7 @@ layout(binding = SHADOW_MAP_UNIT) uniform sampler2D shadow_map;
 uniform vec3 camera_position;   // m, from the local origin
 uniform vec3 camera_backward;   // unit
 uniform bool is_orthographic;
+uniform float weight;           // of this sample of the lamp in this picture
 
 layout(location = 0) out vec4 out_radiance; // W/(m² sr)
 
@@ -37,7 +38,8 @@ void main() {
     Surface surface = fetch_surface(pixel);
     vec3 to_camera = is_orthographic ? camera_backward : normalize(camera_position - position);
     Reflector reflector = make_reflector(surface, to_camera, albedo_table);
+    reflector.alpha = widened_alpha(reflector.alpha, ray.solid_angle);
     vec3 radiance = reflector.diffuse * INVERSE_PI * irradiance
         + specular_reflection(reflector, normal, ray.direction, to_camera) * specular_irradiance;
-    out_radiance = vec4(lit * radiance, 0.0);
+    out_radiance = vec4(weight * lit * radiance, 0.0);
 }

@@ -59,10 +59,13 @@ def area_of(light: Light) -> float:
     return rectangle * math.pi / 4.0 if light.shape == ELLIPSE else rectangle
 
 
-def lamp_samples(light: Light, count: int) -> tuple[LampSample, ...]:
-    """`count` points that share the lamp evenly, or a single one for a lamp that casts hard shadows."""
+def lamp_samples(light: Light, count: int, together: int = 1) -> tuple[LampSample, ...]:
+    """`count` points that share the lamp evenly, or a single one for a lamp that casts hard shadows.
+
+    together: how many consecutive ones are used in the same picture of a frame.
+    """
     samples = _samples_in_rows(light, count)
-    return samples if len(samples) == 1 else tuple(samples[i] for i in _order(count))
+    return samples if len(samples) == 1 else tuple(samples[i] for i in _order(count, together))
 
 
 def _samples_in_rows(light: Light, count: int) -> tuple[LampSample, ...]:
@@ -82,19 +85,19 @@ def _samples_in_rows(light: Light, count: int) -> tuple[LampSample, ...]:
 
 
 @lru_cache(maxsize=64)
-def _order(count: int) -> tuple[int, ...]:
-    """An order of `count` strata in which their places hang least on the index and on its base 2 radical inverse.
+def _order(count: int, together: int) -> tuple[int, ...]:
+    """An order of `count` strata in which their places hang least on the picture that they are used in.
 
-    The samples of a frame look at different places in a pixel, by those two; were the lamp's points tied to them,
-    light that varies over the pixel would be weighted by where it comes from.
+    The pictures of a frame look at different places in a pixel, by their index and its base 2 radical inverse; were
+    the lamp's points tied to them, light that varies over the pixel would be weighted by where it comes from.
     """
-    if count < 3:
+    index = np.arange(count) // together
+    if index[-1] < 2:
         return tuple(range(count))
-    index = np.arange(count)
-    bits = np.arange(count.bit_length())
+    bits = np.arange(int(index[-1]).bit_length())
     inverse = ((index[:, None] >> bits) & 1) @ 0.5 ** (bits + 1)
     x, y, width, height = _strata(count)
-    places = np.stack([x + 0.5 * width, y + 0.5 * height + 1e-9 * index])
+    places = np.stack([x + 0.5 * width, y + 0.5 * height + 1e-9 * np.arange(count)])
     random = np.random.default_rng(count)
 
     def tie(order: np.ndarray) -> float:

@@ -11,16 +11,20 @@ from ..gpu_layout import CONSTANTS, LAMP
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..view import View
 from .gbuffer import GBuffer
-from .shadow_map import LampShadows
+from .shadow_map import LampShadows, ShadowMap
 
 if TYPE_CHECKING:
     import moderngl
 
 
+# Points of a soft lamp in a finished frame, at least: fewer show as steps in its penumbra.
+LEAST_SOFT_POINTS = 64
+
+
 class DirectLightPass:
     """Diffuse and specular reflection of every lamp, one draw for each, with filtered shadows.
 
-    Each call takes one point of every soft lamp; the mean over all sample indices converges to the soft shadow.
+    Each call takes some points of every soft lamp; the mean over all sample indices converges to the soft shadow.
     """
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
@@ -39,20 +43,28 @@ class DirectLightPass:
         """
         self._framebuffer.clear()
         self._albedo.bind()
-        for index in range(len(shadows.lights)):
-            shadow_map = shadows.shadow_map(index, sample_index, sample_count)
-            self._lamp.write(shadow_map.record.tobytes())
-            self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
-            # Drawing a shadow map binds the materials' textures to the units of the G-buffer.
-            gbuffer.bind()
-            shadow_map.bind()
-            set_uniforms(
-                self._fullscreen.program,
-                {
-                    "camera_position": view.position,
-                    "camera_backward": view.backward,
-                    "is_orthographic": view.is_orthographic,
-                },
-            )
-            self._fullscreen.draw(self._framebuffer, additive=True)
+        camera = {
+            "camera_position": view.position,
+            "camera_backward": view.backward,
+            "is_orthographic": view.is_orthographic,
+        }
+        set_uniforms(self._fullscreen.program, camera)
+        for lamp in range(len(shadows.lights)):
+            # A picture of few samples still gets enough points of each soft lamp.
+            together = shadows.samples_of(lamp, -(-LEAST_SOFT_POINTS // sample_count))
+            for part in range(together):
+                index = sample_index * together + part
+                shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together)
+                self._add(gbuffer, shadow_map, 1.0 / together)
         return self._radiance
+
+    def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, weight: float) -> None:
+        # New storage: llvmpipe (Mesa 22) lets a write overtake draws that still read the old one.
+        self._lamp.orphan()
+        self._lamp.write(shadow_map.record.tobytes())
+        self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
+        # Drawing a shadow map binds the materials' textures to the units of the G-buffer.
+        gbuffer.bind()
+        shadow_map.bind()
+        set_uniforms(self._fullscreen.program, {"weight": weight})
+        self._fullscreen.draw(self._framebuffer, additive=True)

@@ -61,6 +61,8 @@ class PhaseOnePass:
         for done, (lamp, sample, sample_count) in enumerate(runs):
             step(progress, done / len(runs), "phase one")
             shadow_map = shadows.shadow_map(lamp, sample, sample_count)
+            # New storage: llvmpipe (Mesa 22) lets a write overtake work that still reads the old one.
+            self._lamp.orphan()
             self._lamp.write(shadow_map.record.tobytes())
             self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
             for name, buffer in held.items():

@@ -29,6 +29,9 @@ FRONT_FACE = 5
 CUBE_TILES = (3, 2)
 # A map of one tile has this many times the cube's texels per side: about as many in all.
 SINGLE_TILE_FACTOR = 2
+# Maps of soft lamps are this much coarser: many of them are averaged, and drawn for every picture.
+SOFT_DIVISOR = 2
+LEAST_RESOLUTION = 16
 # Texels around what must be seen, for the filter.
 MARGIN = 2.0
 # Nearest occluder that counts, of the distance to the farthest: no precision depends on it.
@@ -57,7 +60,7 @@ class ShadowMapPass:
     """Draws maps of nearness for lamps of every kind."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
-        """resolution: texels along a cube's face; a map of a single view has twice as many."""
+        """resolution: texels along a cube's face; a map of a single view has twice as many, soft lamps half."""
         self._context = context
         self._opaque = shaders.program(VERTEX, FRAGMENT)
         self._shaders = shaders
@@ -79,10 +82,14 @@ class ShadowMapPass:
 
     def size(self, light: Light) -> tuple[int, int]:
         """Width and height of the maps of `light`, texels."""
+        face = self._face(light)
         if shadow_kind(light) == "SHADOW_CUBE":
-            return CUBE_TILES[0] * self._resolution, CUBE_TILES[1] * self._resolution
-        side = SINGLE_TILE_FACTOR * self._resolution
-        return side, side
+            return CUBE_TILES[0] * face, CUBE_TILES[1] * face
+        return SINGLE_TILE_FACTOR * face, SINGLE_TILE_FACTOR * face
+
+    def _face(self, light: Light) -> int:
+        """Texels along a cube's face."""
+        return max(self._resolution // (SOFT_DIVISOR if is_soft(light) else 1), LEAST_RESOLUTION)
 
     def render(
         self,
@@ -90,13 +97,16 @@ class ShadowMapPass:
         light: Light,
         sample_index: int,
         sample_count: int,
+        together: int = 1,
         texture: moderngl.Texture | None = None,
     ) -> ShadowMap:
         """The map of one of `sample_count` points of `light`, drawn over `texture` if one is given.
 
+        together: how many consecutive points are used in one picture.
+
         A lamp that casts no shadow, or a scene without triangles, gives an empty map.
         """
-        samples = lamp_samples(light, sample_count)
+        samples = lamp_samples(light, sample_count, together)
         sample = samples[sample_index % len(samples)]
         record = lamp_record(light, sample, geometry.origin)
         if not light.casts_shadow or geometry.triangle_count == 0:
@@ -155,17 +165,19 @@ class ShadowMapPass:
             tangents = math.tan(0.5 * light.spot_angle) * np.array(light.spot_scale) / (1.0 - 2.0 * MARGIN / width)
             record["shadow_extent"] = tangents
             return [(_perspective(axes, origin, FRONT_FACE, tangents, near), (0, 0, width, height))]
-        tangents = np.full(2, 1.0 / (1.0 - 2.0 * MARGIN / self._resolution))
+        side = self._face(light)
+        tangents = np.full(2, 1.0 / (1.0 - 2.0 * MARGIN / side))
         record["shadow_extent"] = tangents
         return [
-            (_perspective(axes, origin, face, tangents, near), self._tile(face))
+            (_perspective(axes, origin, face, tangents, near), _tile(face, side))
             for face in range(len(CUBE_FACES))
             if _may_see(light, face, seen, float(tangents[0]))
         ]
 
-    def _tile(self, face: int) -> tuple[int, int, int, int]:
-        column, row = face % CUBE_TILES[0], face // CUBE_TILES[0]
-        return column * self._resolution, row * self._resolution, self._resolution, self._resolution
+
+def _tile(face: int, side: int) -> tuple[int, int, int, int]:
+    """Viewport of a cube's face in its map."""
+    return face % CUBE_TILES[0] * side, face // CUBE_TILES[0] * side, side, side
 
 
 def shadow_kind(light: Light) -> str:
@@ -175,11 +187,6 @@ def shadow_kind(light: Light) -> str:
     if light.kind == SPOT and light.spot_angle * max(1.0, *light.spot_scale) <= WIDEST_CONE:
         return "SHADOW_CONE"
     return "SHADOW_CUBE"
-
-
-def depends_on_sample(light: Light, geometry: GpuGeometry) -> bool:
-    """Whether each sample of a frame needs another map: soft lamps, and occluders that are let through by chance."""
-    return light.casts_shadow and (is_soft(light) or geometry.has_alpha)
 
 
 def _box_corners(low: Float64, high: Float64) -> Float64:
@@ -242,26 +249,28 @@ class LampShadows:
         self._kept_bytes = 0
         self._shared: dict[tuple[int, int], moderngl.Texture] = {}
 
-    def shadow_map(self, lamp_index: int, sample_index: int, sample_count: int) -> ShadowMap:
-        """The map of one sample of a lamp; valid until the next call for another lamp or sample."""
-        light = self.lights[lamp_index]
+    def shadow_map(self, lamp_index: int, sample_index: int, sample_count: int, together: int = 1) -> ShadowMap:
+        """The map of one of `sample_count` samples of a lamp; valid until the next call for another one.
+
+        together: how many consecutive samples are used in one picture.
+        """
         if lamp_index in self._kept:
             return self._kept[lamp_index]
-        if depends_on_sample(light, self._geometry) or self._kept_bytes >= CACHE_BYTES:
-            return self._pass.render(self._geometry, light, sample_index, sample_count, self._shared_texture(light))
-        shadow_map = self._pass.render(self._geometry, light, sample_index, sample_count)
-        width, height = shadow_map.texture.size
+        light = self.lights[lamp_index]
+        width, height = self._pass.size(light)
+        if self._changes(light) or self._kept_bytes >= CACHE_BYTES:
+            if (width, height) not in self._shared:
+                self._shared[width, height] = self._pass.new_texture(light)
+            texture = self._shared[width, height]
+            return self._pass.render(self._geometry, light, sample_index, sample_count, together, texture)
+        self._kept[lamp_index] = self._pass.render(self._geometry, light, sample_index, sample_count)
         self._kept_bytes += 4 * width * height
-        if not is_soft(light):
-            self._kept[lamp_index] = shadow_map
-        return shadow_map
+        return self._kept[lamp_index]
 
     def samples_of(self, lamp_index: int, most: int) -> int:
         """How many samples of a lamp differ, at most `most`."""
-        return most if is_soft(self.lights[lamp_index]) else 1
+        return most if self._changes(self.lights[lamp_index]) else 1
 
-    def _shared_texture(self, light: Light) -> moderngl.Texture:
-        fresh = self._pass.size(light)
-        if fresh not in self._shared:
-            self._shared[fresh] = self._pass.new_texture(light)
-        return self._shared[fresh]
+    def _changes(self, light: Light) -> bool:
+        """Whether samples differ: points of a soft lamp, or occluders that are let through by chance."""
+        return is_soft(light) or (light.casts_shadow and self._geometry.has_alpha)
