@@ -83,16 +83,16 @@ void add_clipped_edge(vec3 a, vec3 b, vec3 n, inout float sum, inout vec3 exit_p
 
 // Share of the hemisphere over p with normal n that an area lamp's cell fills, cosine-weighted.
 float cell_form_factor(Lamp lamp, vec3 p, vec3 n) {
-    vec3 to_sample = lamp.sample_position - p;
-    float distance_squared = dot(to_sample, to_sample);
-    float plane_distance = dot(lamp.z_axis, to_sample);
+    vec3 to_cell = lamp_corner(lamp, lamp.cell_centre) - p;
+    float distance_squared = dot(to_cell, to_cell);
+    float plane_distance = dot(lamp.z_axis, to_cell);
     if (plane_distance <= 0.0) {
         return 0.0;
     }
     float far = AREA_LAMP_FAR * lamp.cell_radius;
     if (distance_squared > far * far) {
         float scale = lamp.cell_area / (FORM_FACTOR_PI * distance_squared * distance_squared);
-        return max(dot(n, to_sample), 0.0) * plane_distance * scale;
+        return max(dot(n, to_cell), 0.0) * plane_distance * scale;
     }
     vec2 corners[8] = vec2[8](
         lamp.corners_01.xy, lamp.corners_01.zw, lamp.corners_23.xy, lamp.corners_23.zw,

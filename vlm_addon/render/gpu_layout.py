@@ -139,6 +139,7 @@ LAMP = GpuStruct(
         ("float", "shadow_range"),
         ("int", "shadow_kind"),
         ("float", "sample_weight"),
+        ("vec2", "cell_centre"),
     ),
 )
 """One sample of a lamp and the frame of its shadow map; filled by render/lamp_records.py, read by lib/lights.glsl.

@@ -61,4 +61,5 @@ def _set_cell(record: np.ndarray, cell: Float64) -> None:
     x, y = cell.T
     record["corner_count"] = len(cell)
     record["cell_area"] = 0.5 * abs((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+    record["cell_centre"] = cell.mean(axis=0)
     record["cell_radius"] = np.linalg.norm(cell - cell.mean(axis=0), axis=1).max()
