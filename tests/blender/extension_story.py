@@ -4,6 +4,7 @@
 Run by test_extension.py: `python -I extension_story.py ZIP FOLDER`. Writes FOLDER/story.json: what each step showed.
 """
 
+import importlib.util
 import json
 import os
 import sys
@@ -14,6 +15,7 @@ import numpy as np
 
 MODULE = "bl_ext.user_default.virtual_light_mesh"
 SIZE = 48
+NATIVE = {"moderngl", "glcontext", "fast_simplification"}
 STORY = {}
 
 
@@ -87,7 +89,7 @@ def main():
 
     @step
     def imports_of_native_modules():
-        return sorted({"moderngl", "glcontext", "fast_simplification"} & set(sys.modules))
+        return sorted(NATIVE & set(sys.modules))
 
     @step
     def refusals():
@@ -96,6 +98,10 @@ def main():
         bpy.ops.object.select_all(action="DESELECT")
         found["nothing selected"] = sentence_of(bpy.ops.vlm.create_from_selection)
         found["no light mesh to check"] = sentence_of(bpy.ops.vlm.check)
+        bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+        bpy.ops.object.mode_set(mode="EDIT")
+        found["edit mode"] = sentence_of(bpy.ops.vlm.bake)
+        bpy.ops.object.mode_set(mode="OBJECT")
         bpy.data.objects.remove(bpy.data.objects["Light"])
         found["no light"] = sentence_of(bpy.ops.vlm.light_scene)
         bpy.context.scene.camera = None
@@ -127,6 +133,17 @@ def main():
     def check():
         result = bpy.ops.vlm.check()
         return {"result": sorted(result), "findings": [item.text for item in bpy.context.scene.vlm.findings]}
+
+    @step
+    def counted_twice():
+        bpy.ops.object.select_all(action="DESELECT")
+        cube = bpy.data.objects["Cube"]
+        cube.select_set(True)
+        bpy.context.view_layer.objects.active = cube
+        bpy.ops.vlm.create_from_selection(target_triangles=40)
+        findings = [item.text for item in bpy.context.scene.vlm.findings]
+        bpy.data.objects.remove(bpy.data.objects["VLM Cube"])
+        return findings
 
     @step
     def f12():
@@ -189,6 +206,20 @@ def main():
         names = light_meshes()
         bpy.ops.vlm.bake(target_triangles=40)
         return {"result": first, "light meshes": names, "after a second bake": light_meshes()}
+
+    @step
+    def without_native_modules():
+        room()
+        bpy.context.scene.render.engine = "VLM_ENGINE"
+        find_spec = importlib.util.find_spec
+        importlib.util.find_spec = lambda name, *rest: None if name in NATIVE else find_spec(name, *rest)
+        found = {
+            "create": sentence_of(bpy.ops.vlm.bake),
+            "light scene": sentence_of(bpy.ops.vlm.light_scene),
+            "render": sentence_of(bpy.ops.render.render),
+        }
+        importlib.util.find_spec = find_spec
+        return found
 
     @step
     def material_panel_is_shown():

@@ -73,6 +73,7 @@ def test_enabling_loads_no_native_module(told):
     [
         ("nothing selected", "select the objects"),
         ("no light mesh to check", "create one"),
+        ("edit mode", "Object Mode"),
         ("no light", "add a light"),
         ("no camera", "add one (Add > Camera)"),
         ("empty scene", "add a mesh"),
@@ -100,6 +101,19 @@ def test_undo_takes_it_away_and_redo_brings_it_back(told):
 
 def test_check_ends_and_finds_nothing_wrong_with_what_create_made(told):
     assert told["check"] == {"result": ["FINISHED"], "findings": []}
+
+
+def test_a_light_mesh_for_surfaces_that_have_one_is_a_finding(told):
+    assert any("'Cube' already bounce light in 'VLM Room'" in finding for finding in told["counted_twice"])
+
+
+@pytest.mark.parametrize(
+    ("step", "missing"),
+    [("create", "fast_simplification"), ("light scene", "moderngl"), ("render", "moderngl, glcontext")],
+)
+def test_missing_native_modules_are_named_with_a_remedy(told, step, missing):
+    assert f"Missing {missing}" in told["without_native_modules"][step]
+    assert "reinstall the extension" in told["without_native_modules"][step]
 
 
 def test_a_picture_shows_bounce_light_and_no_pixel_is_darker_for_it(told):

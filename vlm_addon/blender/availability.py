@@ -53,14 +53,24 @@ def selection_problem(context: bpy.types.Context) -> str | None:
     """Why the selection gives no light mesh, or None."""
     if not any(has_geometry(thing) for thing in context.selected_objects):
         return "Nothing to make lights from: select the objects that should bounce light"
-    return authoring_problem()
+    return _writing_problem(context) or authoring_problem()
 
 
 def visible_scene_problem(context: bpy.types.Context) -> str | None:
     """Why the visible scene gives no light mesh, or None."""
     if not any(has_geometry(thing) for thing in rendered_objects(context)):
         return "The scene shows no surfaces: add a mesh (Add > Mesh) or enable an object for rendering"
-    return authoring_problem()
+    return _writing_problem(context) or authoring_problem()
+
+
+def _writing_problem(context: bpy.types.Context) -> str | None:
+    if context.mode != "OBJECT":
+        return (
+            "Leave this mode first (Tab, or the menu at the left of the header): light meshes are made in Object Mode"
+        )
+    if context.scene.library is not None:
+        return f"The scene is linked from {context.scene.library.filepath}: open that file, or make the scene local"
+    return None
 
 
 def check_problem(context: bpy.types.Context) -> str | None:

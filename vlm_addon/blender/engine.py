@@ -66,6 +66,8 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
                 f"scene {scene.name!r}", "has no virtual light mesh", "rendered with direct light only; create one"
             )
             self.report({"WARNING"}, str(finding))
+        if scene.render.film_transparent:
+            self.report({"WARNING"}, "Film > Transparent is not supported: the world is shown and alpha is 1")
         width, height = _picture_size(scene)
         settings = RenderSettings(width=width, height=height, technique=technique, samples=scene.vlm.samples)
         return KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
@@ -86,7 +88,7 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
                 continue
             pixels = frame.images[name][::-1][bottom:top, left:right].copy()
             pixels[..., :3] = convert(pixels[..., :3], to_working)
-            target.rect = pixels.reshape(-1, pixels.shape[-1])
+            target.rect.foreach_set(pixels.ravel())
         self.end_result(result)
 
     def view_update(self, context: Any, depsgraph: Any) -> None:
