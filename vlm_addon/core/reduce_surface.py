@@ -17,8 +17,9 @@ from .source_surface import SourceSurface
 # thousands in all make coarse light meshes worse.
 ROUGH_FACTOR = 8
 ROUGH_LEAST = 4000
-# Share of the budget that the least forms of all shells may take before the weakest shells are left out.
-SHELL_SHARE = 0.75
+# Share of the budget that the least forms of all shells may take before the weakest shells are left out: to show small
+# things as tetrahedra costs the large things more than to give their power to neighbours.
+SHELL_SHARE = 0.25
 LEAST_CLOSED, LEAST_OPEN = 4, 1
 # Triangles below this share of the squared diagonal have no direction to shine in.
 LEAST_AREA = 1e-18
@@ -80,13 +81,15 @@ def _selected(surface: SourceSurface, chosen: Bool) -> ReducedSurface:
 
 
 def _strongest_shells(surface: SourceSurface, solid: Bool, target: int) -> Bool:
-    """(t,): triangles of the strongest shells whose least forms together fit their share of the budget."""
+    """(t,): triangles of the strongest shells, as many as the budget has room for."""
     count = len(surface.closed)
     power = np.bincount(surface.shell, weights=surface.importance(), minlength=count)
     size = np.bincount(surface.shell[solid], minlength=count)
     least = np.minimum(size, np.where(surface.closed, LEAST_CLOSED, LEAST_OPEN))
     order = np.argsort(np.where(size > 0, -power, np.inf), kind="stable")
-    fits = np.cumsum(least[order]) <= max(SHELL_SHARE * target, least[order[0]])
+    fits = np.cumsum(least[order]) <= SHELL_SHARE * target
+    # More where those would not even have as many triangles as there may be lights.
+    fits |= np.cumsum(size[order]) - size[order] < target
     kept = np.zeros(count, bool)
     kept[order[fits]] = True
     return (kept & (size > 0))[surface.shell]
