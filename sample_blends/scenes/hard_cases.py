@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What breaks renderers, in stations around the origin: millimetre props on a kilometre of floor, walls that touch and
+walls in one plane, slivers, one-sheet cloth, thin curved shells, mirrored and squashed objects. Ten cameras look on.
+
+Object positions are multiples of 2^-10 m, so that the whole scene can be moved by 8,192 m without rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from . import blend
+from .shapes import Shape, box, flipped, icosphere, join, lathe, moved, octahedron, patch, shape
+
+FLOOR_EXTENT = 1024.0
+GRAIN = 2.0**-10  # m; nearly a millimetre
+WALL_HEIGHT, WALL_THICKNESS = 2.5, 0.25
+
+# Stations' centres on the floor.
+PROPS, WALLS, SLIVERS, CLOTH, SHELLS, FRAMES = (0, 0), (-5, 3), (4, 3), (0, 6), (5, 7), (-4.5, 9)
+FAR_TOWER = (160, 400)
+
+SUN_IRRADIANCE, POINT_W, SPOT_W, PROP_LAMP_W = 1.2, 120.0, 400.0, 0.004
+
+CAMERAS: tuple[tuple[str, tuple[float, float, float], tuple[float, float, float], float], ...] = (
+    ("01 millimetre props", (0.028, -0.050, 0.030), (0.0, 0.0, 0.003), 50.0),
+    ("02 kilometre floor", (-2.0, -14.0, 1.6), (60.0, 200.0, 2.0), 28.0),
+    ("03 touching walls", (-2.5, 0.25, 1.9), (-5.2, 3.4, 0.8), 28.0),
+    ("04 inner corner", (-5.3, 1.7, 2.0), (-6.6, 2.9, 0.8), 22.0),
+    ("05 slivers", (4.0, -0.25, 1.8), (4.0, 3.0, 0.6), 32.0),
+    ("06 cloth", (-1.9, 3.6, 1.5), (0.0, 6.0, 1.0), 35.0),
+    ("07 cloth from behind", (1.9, 8.3, 1.3), (0.0, 6.0, 1.0), 35.0),
+    ("08 thin shells", (3.2, 4.4, 1.5), (5.1, 7.1, 0.6), 32.0),
+    ("09 grazing", (-30.0, -6.0, 0.02), (10.0, 6.0, 0.5), 50.0),
+    ("10 from above", (0.0, 5.0, 26.0), (0.0, 5.5, 0.0), 30.0),
+)
+
+
+def snapped(position: Sequence[float]) -> tuple[float, ...]:
+    """The nearest position whose coordinates are multiples of GRAIN."""
+    return tuple(round(value / GRAIN) * GRAIN for value in position)
+
+
+def millimetre_props() -> dict[str, Shape]:
+    """Cubes, balls and a spike of one to six millimetres on a saucer, some touching, some hovering by a tenth."""
+    grain = GRAIN
+    return {
+        "Cube 1 mm": moved(box((0, 0, 0), (grain, grain, grain)), (-0.010, -0.004, 0)),
+        "Cube 4 mm": moved(box((0, 0, 0), (4 * grain, 4 * grain, 4 * grain)), (-0.008, -0.002, 0)),
+        "Hovering slab": moved(box((0, 0, 0), (0.012, 0.003, 0.0004)), (-0.004, -0.011, 0.0001)),
+        "Ball 6 mm": moved(icosphere(0.003, 3), (0.004, 0.002, 0.003)),
+        "Ball 1 mm": moved(icosphere(0.0005, 2), (0.0075, -0.003, 0.0005)),
+        "Spike": lathe([(0.0, 0.0), (0.0004, 0.0), (0.0, 0.012)], 12),
+    }
+
+
+def saucer() -> Shape:
+    """A flat dish under the props, its rim a fifth of a millimetre thick."""
+    return lathe([(0.0, -0.0005), (0.012, -0.0005), (0.018, 0.0012), (0.0178, 0.0014), (0.0118, 0.0), (0.0, 0.0)], 48)
+
+
+def touching_walls() -> dict[str, Shape]:
+    """Walls that share a plane, a face, an edge or a corner, without a gap and without overlap of visible faces."""
+    t, h = WALL_THICKNESS, WALL_HEIGHT
+    return {
+        "Long wall": box((-2, 0, 0), (0, t, h)),
+        "Wall in the same plane": box((0, 0, 0), (1.5, t, h)),
+        "Wall at right angles": box((-2, -2, 0), (-2 + t, 0, h)),
+        "Low wall against it": box((-2 + t, -1, 0), (-1, 0, 1.0)),
+        "Block on an edge": box((-1, -2, 0), (-0.25, -1, 0.5)),
+        "Block on a corner": box((-0.25, -1, 0.5), (0.25, -0.5, 1.0)),
+        "Panel in the wall's plane": box((0.25, 0, 0.75), (1.25, 0.0625, 1.75)),
+    }
+
+
+def wall_with_panel_hole() -> Shape:
+    """The wall's front as a frame around the flush panel, its back and sides whole."""
+    t, h = WALL_THICKNESS, WALL_HEIGHT
+    xs, zs = (0.0, 0.25, 1.25, 1.5), (0.0, 0.75, 1.75, h)
+    front = [
+        patch((xs[i], 0, zs[j]), (xs[i + 1] - xs[i], 0, 0), (0, 0, zs[j + 1] - zs[j]))
+        for i in range(3)
+        for j in range(3)
+        if (i, j) != (1, 1)
+    ]
+    whole = box((0, 0, 0), (1.5, t, h))
+    without_front = shape(whole.vertices, [face for index, face in enumerate(whole.faces) if index != 2])
+    return join([*front, without_front])
+
+
+def needle_disc(radius: float, count: int) -> Shape:
+    """A flat disc of triangles that all meet in one point of its rim: ever thinner needles."""
+    angles = np.linspace(0, 2 * math.pi, count, endpoint=False)
+    rim = np.c_[radius * np.cos(angles), np.zeros(count), radius * np.sin(angles)]
+    return shape(rim, [(0, i, i + 1) for i in range(1, count - 1)])
+
+
+def sliver_strip(length: float, height: float) -> Shape:
+    """An upright sheet cut into strips of 1e-1 down to 1e-7 m in width, and the same again, mirrored."""
+    widths = [10.0**-power for power in range(1, 8)]
+    spare = (length - 2 * sum(widths)) / 2
+    xs = np.cumsum([0.0, spare, *widths, *widths[::-1], spare]) - length / 2
+    points = [(x, 0.0, z) for z in (0.0, height) for x in xs]
+    k = len(xs)
+    halves = [((i, i + 1, k + i + 1), (i, k + i + 1, k + i)) for i in range(k - 1)]
+    return shape(points, [triangle for pair in halves for triangle in pair])
+
+
+def degenerate_sheet() -> Shape:
+    """A sheet with triangles without area, in a line and in a point, and with doubled vertices among its good ones."""
+    points = [(0, 0, 0), (0.5, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1), (0.5, 0, 0), (0.5, 0, 0), (0.5, 0, 1)]
+    return shape(points, [(0, 1, 7), (0, 7, 4), (5, 2, 3), (5, 3, 7), (0, 1, 2), (1, 5, 6), (3, 7, 4)])
+
+
+def cloth(width: float, height: float, columns: int = 48, rows: int = 24) -> Shape:
+    """One hanging sheet without thickness, to be seen and lit from both sides."""
+    u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
+    wave = np.sin(6 * math.pi * u + 0.8 * v) + 0.4 * np.sin(14 * math.pi * u - 1.3 * v)
+    points = np.stack([(u - 0.5) * width, 0.16 * (0.3 + 0.7 * (1 - v)) * wave, v * height], axis=-1)
+    sheet = patch((0, 0, 0), (1, 0, 0), (0, 1, 0), columns, rows)
+    return Shape(points.reshape(-1, 3), sheet.faces, sheet.materials, None, True)
+
+
+def half_pipe(radius: float, thickness: float, length: float, segments: int = 40) -> Shape:
+    """Half a tube lying along y, open below, with walls of the given thickness; closed."""
+    angles = np.linspace(0, math.pi, segments + 1)
+    rings = [
+        [(r * math.cos(a), y, r * math.sin(a)) for a in angles]
+        for y in (-length / 2, length / 2)
+        for r in (radius, radius - thickness)
+    ]
+    k = segments + 1
+    outer_front, inner_front, outer_back, inner_back = (np.arange(k) + i * k for i in range(4))
+    pairs = [(outer_front, outer_back), (inner_back, inner_front), (inner_front, outer_front), (outer_back, inner_back)]
+    faces = [(a[i], b[i], b[i + 1], a[i + 1]) for a, b in pairs for i in range(segments)]
+    ends = [(outer_front[i], outer_back[i], inner_back[i], inner_front[i]) for i in (0, segments)]
+    faces += [ends[0][::-1], ends[1]]
+    return shape(np.concatenate(rings), faces)
+
+
+def bowl(radius: float, thickness: float, segments: int = 64, steps: int = 24) -> Shape:
+    """A hemispherical bowl, open at the top, standing on its pole; closed, with walls of the given thickness."""
+    angles = np.linspace(-math.pi / 2, 0, steps + 1)
+    outer = [(radius * math.cos(a), radius + radius * math.sin(a)) for a in angles]
+    inside = radius - thickness
+    inner = [(inside * math.cos(a), radius + inside * math.sin(a)) for a in angles[::-1]]
+    outer[0], inner[-1] = (0.0, outer[0][1]), (0.0, inner[-1][1])
+    return lathe([*outer, *inner], segments)
+
+
+def add_station(scene: Any, parts: dict[str, Shape], centre: Sequence[float], material: Any) -> None:
+    """Objects with their origins at a station's centre."""
+    for name, part in parts.items():
+        blend.add_mesh(scene, name, part, material).location = snapped((*centre, 0.0)[:3])
+
+
+def add_frames(scene: Any, material: Any) -> None:
+    """One shape mirrored, squashed, sheared by a parent's scale, and doubled exactly in its place."""
+    x, y = FRAMES
+    corner = join(
+        [box((0, 0, 0), (0.8, 0.25, 0.25)), box((0, 0.25, 0), (0.25, 0.6, 0.25)), box((0, 0, 0.25), (0.25, 0.25, 1.1))]
+    )
+    data = blend.mesh_data("Corner", corner, [material])
+    for index, (scale, turn) in enumerate(
+        (((1, 1, 1), 0.0), ((-1, 1, 1), 0.0), ((1, -1, 1), 0.6), ((2.0, 0.5, 0.001), 0.0))
+    ):
+        added = blend.add_object(scene, f"Corner {index}", data)
+        added.location, added.scale = snapped((x + 1.6 * index - 2.4, y, 0.0)), scale
+        added.rotation_euler = (0, 0, turn)
+    parent = blend.add_object(scene, "Squash", None)
+    parent.location, parent.scale = snapped((x, y + 1.5, 0.0)), (1.5, 0.5, 1.0)
+    child = blend.add_object(scene, "Sheared corner", data)
+    child.parent, child.rotation_euler = parent, (0, 0, 0.7)
+
+
+def build() -> None:
+    """Fills the current file with the scene."""
+    scene = blend.empty_scene("hard_cases", 640, 480)
+    grey, pale = blend.diffuse("Grey floor", (0.42, 0.42, 0.40)), blend.diffuse("Pale", (0.68, 0.66, 0.60))
+    red, blue = blend.diffuse("Red", (0.56, 0.10, 0.07)), blend.diffuse("Blue", (0.09, 0.20, 0.50))
+    green = blend.diffuse("Green", (0.12, 0.42, 0.14))
+    glossy = blend.principled("Glazed", (0.60, 0.42, 0.12))
+
+    half = FLOOR_EXTENT / 2
+    blend.add_mesh(scene, "Kilometre floor", patch((-half, -half, 0), (FLOOR_EXTENT, 0, 0), (0, FLOOR_EXTENT, 0)), grey)
+    tower = moved(box((-4, -4, 0), (4, 4, 60)), (0, 0, 0))
+    blend.add_mesh(scene, "Far tower", tower, red).location = (*FAR_TOWER, 0)
+
+    on_saucer = snapped((*PROPS, GRAIN))
+    blend.add_mesh(scene, "Saucer", saucer(), pale).location = on_saucer
+    for (name, part), material in zip(millimetre_props().items(), (red, blue, green, glossy, pale, red), strict=True):
+        blend.add_mesh(scene, name, part, material).location = on_saucer
+
+    walls = touching_walls() | {"Wall in the same plane": wall_with_panel_hole()}
+    panel = walls.pop("Panel in the wall's plane")
+    add_station(scene, walls, WALLS, pale)
+    add_station(scene, {"Panel in the wall's plane": panel}, WALLS, blue)
+
+    x, y = SLIVERS
+    slivers = {
+        "Needle disc": moved(needle_disc(0.6, 512), (-1.1, 0, 0.75)),
+        "Sliver strip": moved(sliver_strip(1.0, 1.2), (0.2, 0, 0)),
+        "Degenerate sheet": moved(degenerate_sheet(), (0.9, 0, 0)),
+    }
+    add_station(scene, slivers, (x, y), green)
+
+    blend.add_mesh(scene, "Cloth", cloth(2.0, 1.9), red).location = snapped((*CLOTH, 0.125))
+    blend.add_mesh(scene, "Cloth facing away", flipped(cloth(0.8, 1.2)), blue).location = snapped((1.75, 6.5, 0.125))
+
+    shells = {
+        "Half pipe": half_pipe(0.7, 0.002, 1.6),
+        "Bowl": moved(bowl(0.45, 0.003), (1.3, -0.4, 0)),
+        "Half pipe in half pipe": half_pipe(0.694, 0.002, 1.6),
+        "Floating gem": moved(octahedron(0.2), (1.3, -0.4, 0.6)),
+    }
+    add_station(scene, shells, SHELLS, glossy)
+    add_frames(scene, pale)
+
+    sun = blend.add_lamp(scene, "Sun", "SUN", SUN_IRRADIANCE, (-3, -5, 9), (0, 0, 0))
+    sun.data.angle = math.radians(0.53)
+    point = blend.add_lamp(scene, "Point", "POINT", POINT_W, snapped((-4.5, 1.5, 2.25)))
+    point.data.shadow_soft_size = 0.0
+    blend.add_spot(scene, "Spot", SPOT_W, snapped((1.5, 2.0, 4.0)), (3.5, 6.0, 0.0), 90.0, 0.3, 0.05)
+    prop_lamp = blend.add_lamp(scene, "Prop lamp", "POINT", PROP_LAMP_W, snapped((0.02, -0.02, 0.03)))
+    prop_lamp.data.shadow_soft_size = 0.0005
+    for name, position, target, lens in CAMERAS:
+        near = 0.002 if "millimetre" in name else 0.01
+        camera = blend.add_camera(scene, position, target, lens, name=f"Camera {name}", clip=(near, 2 * FLOOR_EXTENT))
+        camera.location = snapped(position)
