@@ -96,16 +96,21 @@ def test_random_lights_give_what_the_closed_form_gives(device: Device, size: flo
     assert found == pytest.approx(truth, rel=2e-4, abs=2e-5 * truth.max())
 
 
-def test_surfaces_in_groups_of_one_direction_give_the_same(device: Device) -> None:
-    """Neighbouring pixels of one flat surface, where a whole group may treat a light alike."""
+@pytest.mark.parametrize("size", [0.3, 0.05, 0.005], ids=["large", "middle", "small and far"])
+@pytest.mark.parametrize("curvature", [0.0, 0.3, 3.0], ids=["flat", "bent", "strongly bent"])
+def test_neighbouring_pixels_of_one_surface_give_the_same(device: Device, curvature: float, size: float) -> None:
+    """Where a whole tile of pixels treats a light alike; a hole in the surface and lights in its plane included."""
     generator = np.random.default_rng(4)
-    pixels, lights = Pixels(generator, (64, 64)), random_lights(generator, 200, 0.1)
-    grid = np.linspace(-1.0, 1.0, 64, dtype=np.float32)
-    pixels.positions[..., 0], pixels.positions[..., 1] = np.meshgrid(grid, grid)
-    pixels.positions[..., 2] = 0.0
-    pixels.normals[...] = (0.0, 0.0, 1.0)
-    pixels.shown[...] = True
-    radiosity = generator.uniform(0.0, 10.0, (200, 3)).astype(np.float32)
+    side, count = 48, 200
+    pixels, lights = Pixels(generator, (side, side)), random_lights(generator, count, size)
+    grid = np.linspace(-1.0, 1.0, side, dtype=np.float32)
+    x, y = np.meshgrid(grid, grid)
+    pixels.positions = np.stack([x, y, -0.5 * np.float32(curvature) * (x * x + y * y)], axis=2)
+    normals = np.stack([curvature * x, curvature * y, np.ones_like(x)], axis=2)
+    pixels.normals = (normals / np.linalg.norm(normals, axis=2, keepdims=True)).astype(np.float32)
+    pixels.shown = np.hypot(x - 0.2, y) > 0.3
+    lights.vertices[: 3 * count // 4, 2] = 0.0
+    radiosity = generator.uniform(0.0, 10.0, (count, 3)).astype(np.float32)
     truth = expected(pixels, lights, radiosity)
     found = irradiance(device, pixels, lights, radiosity)[..., :3]
     assert found == pytest.approx(truth, rel=2e-4, abs=2e-5 * truth.max())

@@ -15,8 +15,11 @@ from .gbuffer import GBuffer
 if TYPE_CHECKING:
     import moderngl
 
-GROUP_WIDTH, GROUP_HEIGHT = 8, 8
-PIXELS_PER_INVOCATION = 4
+# Invocations and pixels per side of a tile: each invocation shades a square of pixels, so that a light is fetched
+# once for all of them.
+GROUP_SIDE = 8
+PIXELS_PER_SIDE = 2
+TILE_SIDE = GROUP_SIDE * PIXELS_PER_SIDE
 # A dispatch of this many evaluations ends within a second on two cores, so no driver takes it for hung and a
 # cancellation is seen; a GPU does it in some milliseconds.
 EVALUATIONS_PER_DISPATCH = 30_000_000
@@ -30,12 +33,7 @@ class PhaseTwoPass:
         self._size = (width, height)
         self._irradiance = context.texture((width, height), 4, dtype="f4")
         self._target = context.framebuffer([self._irradiance])
-        defines = {
-            "GROUP_WIDTH": GROUP_WIDTH,
-            "GROUP_HEIGHT": GROUP_HEIGHT,
-            "PIXELS_PER_INVOCATION": PIXELS_PER_INVOCATION,
-            "UNTAGGED": UNTAGGED,
-        }
+        defines = {"GROUP_SIDE": GROUP_SIDE, "PIXELS_PER_SIDE": PIXELS_PER_SIDE, "UNTAGGED": UNTAGGED}
         self._shader = shaders.compute("passes/phase_two.comp", defines)
         self._context = context
 
@@ -53,13 +51,12 @@ class PhaseTwoPass:
         lights.bind()
         radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
         self._irradiance.bind_to_image(0)
-        groups_x = -(-width // GROUP_WIDTH)
-        groups_y = -(-height // (GROUP_HEIGHT * PIXELS_PER_INVOCATION))
+        tiles_x, tiles_y = -(-width // TILE_SIDE), -(-height // TILE_SIDE)
         chunk = max(EVALUATIONS_PER_DISPATCH // (width * height), MIN_LIGHTS_PER_DISPATCH)
         for first in range(0, lights.count, chunk):
             end = min(first + chunk, lights.count)
             set_uniforms(self._shader, {"first_light": first, "end_light": end})
-            self._shader.run(groups_x, groups_y)
+            self._shader.run(tiles_x, tiles_y)
             self._context.memory_barrier()
             step(progress, end / lights.count, "phase two")
         return self._irradiance
