@@ -18,6 +18,7 @@ ZIP, FOLDER = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 SECONDS_FOR_REDRAW = 0.7
 LONGEST_WAIT_SECONDS = 120.0
 GRID = 700
+FRAMES_UNTIL_SHOWN = 4
 PICTURES = []
 STORY = {"version": bpy.app.version_string, "seen": []}
 
@@ -194,7 +195,8 @@ def story():
     bpy.context.object.display_type = "BOUNDS"
     with in_view():
         STORY["long work"] = sorted(bpy.ops.vlm.create_from_selection("INVOKE_DEFAULT", target_triangles=100))
-    yield 8 * SECONDS_FOR_REDRAW
+    for _ in range(FRAMES_UNTIL_SHOWN):
+        yield SECONDS_FOR_REDRAW
     STORY["ran at Esc"] = not nothing_runs()
     look("8_progress")
     press("ESC")

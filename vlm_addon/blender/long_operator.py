@@ -12,7 +12,7 @@ from ..core.errors import Cancelled, VlmError
 from ..core.progress import Progress
 from .background_work import BackgroundWork
 
-SECONDS_BETWEEN_LOOKS = 0.1
+SECONDS_BETWEEN_LOOKS = 0.2
 PROGRESS_STEPS = 100
 
 T = TypeVar("T")
@@ -29,7 +29,6 @@ class LongOperator(Generic[T]):
     report: Callable[[set[str], str], None]
     _work: BackgroundWork[T]
     _timer: Any
-    _shown: str
 
     def prepare(self, context: bpy.types.Context) -> Callable[[Progress], T]:
         """The work, with all that it needs. Raises VlmError."""
@@ -64,7 +63,6 @@ class LongOperator(Generic[T]):
             self._work = BackgroundWork(self.prepare(context))
         except VlmError as error:
             return self._failed(error)
-        self._shown = ""
         window_manager = context.window_manager
         window_manager.progress_begin(0, PROGRESS_STEPS)
         self._timer = window_manager.event_timer_add(SECONDS_BETWEEN_LOOKS, window=context.window)
@@ -92,11 +90,9 @@ class LongOperator(Generic[T]):
         self._clean_up(context)
 
     def _show_progress(self, context: bpy.types.Context) -> None:
-        text = f"{self._work.label.capitalize()} {self._work.fraction:.0%} (Esc cancels)"
-        if text != self._shown:  # each new text makes Blender draw its window again
-            self._shown = text
-            context.window_manager.progress_update(round(self._work.fraction * PROGRESS_STEPS))
-            context.workspace.status_text_set(text)
+        context.window_manager.progress_update(round(self._work.fraction * PROGRESS_STEPS))
+        label = self._work.label.capitalize()
+        context.workspace.status_text_set(f"{label} {self._work.fraction:.0%} (Esc cancels)")
 
     def _clean_up(self, context: bpy.types.Context) -> None:
         context.window_manager.event_timer_remove(self._timer)
