@@ -69,7 +69,7 @@ class PhaseOnePass:
                 buffer.bind_to_storage_buffer(int(CONSTANTS[name]))
             radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
             shadow_map.bind()
-            set_uniforms(self._shader, {"share": shadow_map.share, "light_count": count})
+            set_uniforms(self._shader, {"share": 1.0 / sample_count, "light_count": count})
             self._shader.run(-(-count // GROUP_SIZE))
             self._context.memory_barrier()
         return radiosity

@@ -44,12 +44,11 @@ CACHE_BYTES = 1 << 29
 class ShadowMap:
     """A lamp's sample and what it sees.
 
-    texture: R32F of nearness, unfiltered. record: (1,) of gpu_layout.LAMP. share: of the lamp that the sample is.
+    texture: R32F of nearness, unfiltered. record: (1,) of gpu_layout.LAMP.
     """
 
     texture: moderngl.Texture
     record: np.ndarray
-    share: float
 
     def bind(self) -> None:
         """Binds the map to its texture unit."""
@@ -110,7 +109,7 @@ class ShadowMapPass:
         sample = samples[sample_index % len(samples)]
         record = lamp_record(light, sample, geometry.origin)
         if not light.casts_shadow or geometry.triangle_count == 0:
-            return ShadowMap(self._empty, record, sample.share)
+            return ShadowMap(self._empty, record)
         record["shadow_kind"] = CONSTANTS[shadow_kind(light)]
         target = texture or self.new_texture(light)
         framebuffer = self._context.framebuffer([target])
@@ -118,7 +117,7 @@ class ShadowMapPass:
         for matrix, viewport in self._views(light, record, geometry):
             framebuffer.viewport = viewport
             self._draw(framebuffer, geometry, matrix, record, sample_index)
-        return ShadowMap(target, record, sample.share)
+        return ShadowMap(target, record)
 
     def _draw(
         self,
