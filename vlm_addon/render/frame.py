@@ -75,7 +75,7 @@ def render_frame(
         sums = accumulate.read()
     images, findings = _finished_images(sums)
     if settings.buffers:
-        images |= {"irradiance": images.pop("irradiance"), "coverage": sums["direct"][..., 3:]}
+        images["coverage"] = np.ascontiguousarray(sums["direct"][..., 3:])
         images |= _surface_images(gbuffer_pass, geometry, camera, settings)
     else:
         del images["irradiance"]
@@ -153,6 +153,6 @@ def _surface_images(
 def _scene_findings(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None) -> list[Finding]:
     glows = any(max(material.emission) > 0.0 for material in snapshot.materials)
     shines = light_mesh is not None and bool((light_mesh.emission > 0.0).any())
-    if snapshot.lights or glows or shines or max(snapshot.world_radiance) > 0.0:
+    if snapshot.lights or glows or shines or not snapshot.triangle_count:
         return []
-    return [Finding(f"scene {snapshot.name!r}", "nothing in it gives light", "add a lamp or an emissive material")]
+    return [Finding(f"scene {snapshot.name!r}", "nothing lights its surfaces", "add a lamp or an emissive material")]

@@ -36,12 +36,15 @@ class VirtualLightMeshTechnique(Technique):
                 scene.light_mesh, scene.geometry.origin, scene.shadows, scene.settings.shadow_samples, scene.progress
             )
         self._phase_two = PhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        self._evaluations = 0
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over all lights of radiosity times form factor."""
+        width, height = frame.gbuffer.size
+        self._evaluations += width * height * self._lights.count
         with self.scene.timer.measure("phase two"):
             return self._phase_two.render(frame.gbuffer, self._lights, self._radiosity, frame.progress)
 
     def counters(self) -> dict[str, float]:
-        """Virtual lights."""
-        return {"virtual_lights": self._lights.count}
+        """Virtual lights, and for how many pairs of a light and a pixel of a sample they were summed."""
+        return {"virtual_lights": self._lights.count, "evaluations": self._evaluations}
