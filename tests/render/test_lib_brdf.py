@@ -3,31 +3,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.render.shader_functions import evaluate
 from vlm_addon.core import brdf
 from vlm_addon.render.albedo_texture import AlbedoTexture
 from vlm_addon.render.device import Device
 
-_spec = importlib.util.spec_from_file_location("shader_functions", Path(__file__).with_name("shader_functions.py"))
-assert _spec is not None
-assert _spec.loader is not None
-shader_functions = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(shader_functions)
-
 COUNT = 500
 SURFACE = "Surface(vec3(0.0), 1.0, n, n, color, vec3(0.0), roughness, metallic, level, ior, 0, 0, 0, MODEL_{model})"
-
-
-@pytest.fixture(scope="module")
-def device() -> Iterator[Device]:
-    with Device() as opened:
-        yield opened
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -59,7 +44,7 @@ def _filled(constants: dict[str, float]) -> dict[str, np.ndarray]:
 def call(device: Device, expression: str, inputs: dict[str, np.ndarray], components: int = 3) -> np.ndarray:
     with device.current() as context:
         AlbedoTexture(context).bind()
-        return shader_functions.evaluate(device, "passes/reflectance.glsl", expression, inputs, components)
+        return evaluate(device, "passes/reflectance.glsl", expression, inputs, components)
 
 
 def brdf_of(device: Device, inputs: dict[str, np.ndarray], model: str) -> np.ndarray:

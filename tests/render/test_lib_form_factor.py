@@ -3,31 +3,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.render.shader_functions import evaluate
 from vlm_addon.core.form_factor import paired_form_factor
 from vlm_addon.render.device import Device
-
-_spec = importlib.util.spec_from_file_location("shader_functions", Path(__file__).with_name("shader_functions.py"))
-assert _spec is not None
-assert _spec.loader is not None
-shader_functions = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(shader_functions)
 
 COUNT = 2000
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 DOWN = np.array([0.0, 0.0, -1.0])
-
-
-@pytest.fixture(scope="module")
-def device() -> Iterator[Device]:
-    with Device() as opened:
-        yield opened
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -45,7 +30,7 @@ def shader(device: Device, points: np.ndarray, normals: np.ndarray, triangles: n
     area_vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inputs = {"p": points, "n": normals, "a": corners[:, 0], "b": corners[:, 1], "c": corners[:, 2], "v": area_vectors}
     call = "triangle_form_factor(p, n, a, b, c, v)"
-    return shader_functions.evaluate(device, "lib/form_factor.glsl", call, inputs)
+    return evaluate(device, "lib/form_factor.glsl", call, inputs)
 
 
 def oracle(points: np.ndarray, normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -3,26 +3,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.render.shader_functions import evaluate
 from vlm_addon.core import lamps
 from vlm_addon.core.scene import AREA, ELLIPSE, POINT, SPOT, SUN, Light
 from vlm_addon.render.device import Device
 from vlm_addon.render.gpu_layout import LAMP
 from vlm_addon.render.lamp_records import lamp_record
-
-_spec = importlib.util.spec_from_file_location("shader_functions", Path(__file__).with_name("shader_functions.py"))
-assert _spec is not None
-assert _spec.loader is not None
-shader_functions = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(shader_functions)
 
 COUNT = 500
 TILTED = {
@@ -44,12 +36,6 @@ LAMPS = {
     "tiny rectangle": replace(BASE, kind=AREA, size_x=0.001, size_y=0.002),
     "ellipse": replace(BASE, kind=AREA, size_x=2.0, size_y=0.5, shape=ELLIPSE),
 }
-
-
-@pytest.fixture(scope="module")
-def device() -> Iterator[Device]:
-    with Device() as opened:
-        yield opened
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -75,7 +61,7 @@ def shader(device: Device, light: Light, points: np.ndarray, normals: np.ndarray
     for sample in lamps.lamp_samples(light, samples):
         call = f"lamp_irradiance({lamp_literal(light, sample)}, p, n)"
         inputs = {"p": points, "n": normals}
-        total += sample.share * shader_functions.evaluate(device, "lib/lights.glsl", call, inputs, components=3)
+        total += sample.share * evaluate(device, "lib/lights.glsl", call, inputs, components=3)
     return total
 
 
@@ -107,7 +93,7 @@ def test_samples_of_a_rectangle_sum_to_the_whole(device: Device, count: int) -> 
 def test_horizon_cosine(device: Device, sine: float) -> None:
     cosines = np.linspace(-1.0, 1.0, 2001)
     inputs = {"c": cosines, "s": np.full(2001, sine)}
-    found = shader_functions.evaluate(device, "lib/lights.glsl", "horizon_cosine(c, s)", inputs)
+    found = evaluate(device, "lib/lights.glsl", "horizon_cosine(c, s)", inputs)
     expected = lamps.horizon_cosine(cosines.astype(np.float32), np.full(2001, sine, np.float32))
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-4 * max(sine, 0.01))
 
@@ -116,7 +102,7 @@ def test_horizon_cosine(device: Device, sine: float) -> None:
 def test_arctangent_over_the_half_circle(device: Device, x: float) -> None:
     y = np.concatenate([np.linspace(0.0, 2.0, 1001), [1e-20, 1e20]])
     inputs = {"y": y, "x": np.full(len(y), x)}
-    found = shader_functions.evaluate(device, "lib/lights.glsl", "half_circle_arctangent(y, x)", inputs)
+    found = evaluate(device, "lib/lights.glsl", "half_circle_arctangent(y, x)", inputs)
     np.testing.assert_allclose(found, np.arctan2(y, x), rtol=0.0, atol=6e-7)
 
 
@@ -136,7 +122,7 @@ def ray(device: Device, light: Light, points: np.ndarray) -> tuple[np.ndarray, n
     for sample in samples:
         call = f"lamp_ray({lamp_literal(light, sample)}, p)"
         call = f"vec4({call}.irradiance, {call}.solid_angle)"
-        values = shader_functions.evaluate(device, "lib/lights.glsl", call, {"p": points}, components=4)
+        values = evaluate(device, "lib/lights.glsl", call, {"p": points}, components=4)
         irradiance += sample.share * values[:, :3]
         angle += values[:, 3]
     return irradiance, angle

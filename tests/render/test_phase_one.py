@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,12 +20,6 @@ POWER = (10.0, 20.0, 30.0)
 COLOUR = np.array([0.5, 0.25, 2.0], np.float32)
 EMISSION = np.array([1.0, 0.0, 3.0], np.float32)
 STRENGTH = 1.5
-
-
-@pytest.fixture(scope="module")
-def device() -> Iterator[Device]:
-    with Device() as opened:
-        yield opened
 
 
 def quad(corners: list[list[float]]) -> Mesh:

@@ -74,6 +74,7 @@ def read_light(
         size_x=size_x,
         size_y=size_y,
         casts_shadow=lamp.use_shadow,
+        soft_falloff=getattr(lamp, "use_soft_falloff", True),
     )
 
 
