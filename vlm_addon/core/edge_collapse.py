@@ -228,32 +228,30 @@ def _shapes_hold(state: _State, edges: _Edges, candidate: Int64, position: Float
     vertex = state.triangles[face]
     a, b = edges.half.ends[candidate[owner]].T
     moved = (vertex == a[:, None]) | (vertex == b[:, None])
-    remains = moved.sum(axis=1) == 1
-    owner, face, vertex, moved = owner[remains], face[remains], vertex[remains], moved[remains]
-    before = state.positions[vertex]
-    after = np.where(moved[:, :, None], position[owner][:, None, :], before)
-    normal_before, length_before, quality_before = _shape(before)
-    normal_after, length_after, quality_after = _shape(after)
-    turn = np.einsum("ij,ij->i", normal_before, normal_after)
-    flipped = turn <= rules.minimum_turn_cosine * length_before * length_after
-    flipped &= length_before > 0
-    first = state.first_normal[face]
-    turn_before = np.einsum("ij,ij->i", first, normal_before) / np.where(length_before > 0, length_before, 1.0)
-    turn_after = np.einsum("ij,ij->i", first, normal_after) / np.where(length_after > 0, length_after, 1.0)
-    flipped |= turn_after < np.minimum(rules.minimum_turn_cosine, turn_before)
-    sliver = quality_after < np.minimum(rules.minimum_quality, quality_before)
-    sliver |= length_after <= 0
+    remains = np.flatnonzero(moved.sum(axis=1) == 1)
+    owner, face, corner = owner[remains], face[remains], moved[remains].argmax(axis=1)
+    following = np.stack([vertex[remains, (corner + 1) % 3], vertex[remains, (corner + 2) % 3]])
+    normal, doubled, quality = _shape(*np.moveaxis(state.positions[state.triangles], 1, 0))
+    turned = np.einsum("ij,ij->i", state.first_normal, normal)
+    normal_after, doubled_after, quality_after = _shape(position[owner], *state.positions[following])
+    flipped = np.einsum("ij,ij->i", normal[face], normal_after) <= rules.minimum_turn_cosine
+    flipped &= doubled[face] > 0
+    turned_after = np.einsum("ij,ij->i", state.first_normal[face], normal_after)
+    flipped |= turned_after < np.minimum(rules.minimum_turn_cosine, turned[face])
+    sliver = quality_after < np.minimum(rules.minimum_quality, quality[face])
+    sliver |= doubled_after <= 0
     return np.bincount(owner[flipped | sliver], minlength=len(candidate)) == 0
 
 
-def _shape(corners: Float64) -> tuple[Float64, Float64, Float64]:
-    """(double area vector, its length, quality 4 sqrt(3) area / sum of squared sides)."""
-    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+def _shape(a: Float64, b: Float64, c: Float64) -> tuple[Float64, Float64, Float64]:
+    """(unit normal or 0, twice the area, quality 4 sqrt(3) area / sum of squared sides) of triangles a b c."""
+    ab, ac = b - a, c - a
     bc = ac - ab
     normal = np.cross(ab, ac)
-    length = np.linalg.norm(normal, axis=1)
+    doubled = np.sqrt(np.einsum("ij,ij->i", normal, normal))
     squares = np.einsum("ij,ij->i", ab, ab) + np.einsum("ij,ij->i", ac, ac) + np.einsum("ij,ij->i", bc, bc)
-    return normal, length, 2 * np.sqrt(3.0) * length / np.maximum(squares, np.finfo(float).tiny)
+    quality = 2 * np.sqrt(3.0) * doubled / np.maximum(squares, np.finfo(float).tiny)
+    return normal / np.where(doubled > 0, doubled, 1.0)[:, None], doubled, quality
 
 
 def _independent(edges: _Edges, candidate: Int64, triangle_count: int) -> Int64:

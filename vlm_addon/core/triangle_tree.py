@@ -23,13 +23,15 @@ class TriangleTree:
     """A complete binary tree over triangles in Morton order.
 
     order: (slots,) int64, triangle of each slot of the leaves, -1 for padding. lower, upper: one (nodes, 3) array per
-    level, root first.
+    level, root first. triangle_lower, triangle_upper: (t, 3) box of each triangle.
     """
 
     corners: Float64
     order: Int64
     lower: tuple[Float64, ...]
     upper: tuple[Float64, ...]
+    triangle_lower: Float64
+    triangle_upper: Float64
 
     def first_hits(self, origins: Float64, ends: Float64, from_behind: bool = False) -> Float64:
         """(r,) fraction in (0, 1] of the way from origin to end at which each segment first meets a triangle, else inf.
@@ -45,16 +47,27 @@ def build_tree(corners: Float64) -> TriangleTree:
     count = len(corners)
     levels = max(0, int(np.ceil(np.log2(max(count, 1) / LEAF_SIZE)))) if count > LEAF_SIZE else 0
     order = np.full(LEAF_SIZE << levels, -1, np.int64)
-    order[:count] = np.argsort(morton_codes(corners.mean(axis=1)), kind="stable")
+    order[:count] = np.lexsort([morton_codes(corners.mean(axis=1)), _size_classes(corners)])
     filled = order >= 0
     low = np.full((len(order), 3), np.inf)
     high = np.full((len(order), 3), -np.inf)
-    low[filled], high[filled] = corners[order[:count]].min(axis=1), corners[order[:count]].max(axis=1)
+    box_low, box_high = corners.min(axis=1), corners.max(axis=1)
+    low[filled], high[filled] = box_low[order[:count]], box_high[order[:count]]
     lower, upper = [low.reshape(-1, LEAF_SIZE, 3).min(axis=1)], [high.reshape(-1, LEAF_SIZE, 3).max(axis=1)]
     for _ in range(levels):
         lower.insert(0, lower[0].reshape(-1, 2, 3).min(axis=1))
         upper.insert(0, upper[0].reshape(-1, 2, 3).max(axis=1))
-    return TriangleTree(corners, order, tuple(lower), tuple(upper))
+    return TriangleTree(corners, order, tuple(lower), tuple(upper), box_low, box_high)
+
+
+def _size_classes(corners: Float64) -> Int64:
+    """(t,): how many times each triangle is four times as large as the median. One wall would swell the boxes of all
+    small triangles near its middle, so large ones get branches of their own."""
+    extent = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1) if len(corners) else np.zeros(0)
+    median = float(np.median(extent)) if len(extent) else 0.0
+    ratio = extent / (median if median > 0 else 1.0)
+    classes: Int64 = np.floor(0.5 * np.log2(np.maximum(ratio, 1.0))).astype(np.int64)
+    return classes
 
 
 def morton_codes(points: Float64) -> Int64:
@@ -96,6 +109,9 @@ def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind
     triangle = tree.order.reshape(-1, LEAF_SIZE)[node]
     segment = np.repeat(segment, LEAF_SIZE)[triangle.ravel() >= 0]
     triangle = triangle[triangle >= 0]
+    overlap = (low[segment] <= tree.triangle_upper[triangle]).all(axis=1)
+    overlap &= (high[segment] >= tree.triangle_lower[triangle]).all(axis=1)
+    segment, triangle = segment[overlap], triangle[overlap]
     fraction = _intersections(tree.corners[triangle], origins[segment], ends[segment], from_behind)
     nearest = np.full(len(origins), np.inf)
     np.minimum.at(nearest, segment, fraction)
