@@ -26,23 +26,22 @@ float double_arctangent_ratio(float u) {
 }
 
 // Angle at the point between a and b, times the cosine between n and the plane through both: one edge's share of
-// 2 pi E. a, b: m, from the point to the ends of an edge as it runs counter-clockwise seen from the light's back.
-float edge_irradiance(vec3 a, vec3 b, vec3 n) {
+// 2 pi E. a, b: m, from the point to the ends of an edge that runs clockwise seen from the point.
+float edge_irradiance(vec3 a, vec3 b, float a_squared, float b_squared, vec3 n) {
     vec3 c = cross(a, b - a);
     float cos_r = dot(a, b);
-    float r = sqrt(dot(a, a) * dot(b, b));
+    float r = sqrt(a_squared * b_squared);
     float c_squared = dot(c, c);
     float q = max(r + abs(cos_r), 1e-30);
     float ratio = double_arctangent_ratio(min(1.0, c_squared / (q * q))) / q;
-    float projected = dot(n, c);
-    if (cos_r >= 0.0) {
-        return ratio * projected;
-    }
-    float c_length = sqrt(c_squared);
-    if (c_length <= FORM_FACTOR_ON_EDGE * r) {
-        return 0.0;
-    }
-    return (FORM_FACTOR_PI / c_length - ratio) * projected;
+    float least = FORM_FACTOR_ON_EDGE * r;
+    // Over an acute angle nothing is divided by the length of c; with the point on the edge its direction is noise.
+    float obtuse = c_squared > least * least ? FORM_FACTOR_PI * inversesqrt(max(c_squared, 1e-37)) - ratio : 0.0;
+    return (cos_r >= 0.0 ? ratio : obtuse) * dot(n, c);
+}
+
+float edge_irradiance(vec3 a, vec3 b, vec3 n) {
+    return edge_irradiance(a, b, dot(a, a), dot(b, b), n);
 }
 
 // Angle between a and b in [0, pi]: the arc along the horizon. Lies on the rim of the cosine-weighted disk, so it
@@ -50,74 +49,19 @@ float edge_irradiance(vec3 a, vec3 b, vec3 n) {
 float horizon_arc(vec3 a, vec3 b) {
     vec3 c = cross(a, b - a);
     float cos_r = dot(a, b);
-    float c_length = length(c);
-    float t = c_length / max(sqrt(dot(a, a) * dot(b, b)) + abs(cos_r), 1e-30);
+    float t = length(c) / max(sqrt(dot(a, a) * dot(b, b)) + abs(cos_r), 1e-30);
     float angle = double_arctangent_ratio(min(1.0, t * t)) * t;
     return cos_r >= 0.0 ? angle : FORM_FACTOR_PI - angle;
 }
 
 // Mean over three points of height / distance^4, in 1/m^3. a, b, c: m, from the point. heights: m, of a, b and c.
 float far_integrand(vec3 a, vec3 b, vec3 c, vec3 heights) {
-    vec3 middle = (a + b + c) * (1.0 / 3.0);
+    vec3 sum = a + b + c;
     vec3 middle_heights = 0.5 * (heights + (heights.x + heights.y + heights.z) * (1.0 / 3.0));
-    vec3 ma = 0.5 * (middle + a), mb = 0.5 * (middle + b), mc = 0.5 * (middle + c);
+    vec3 middle = sum * (1.0 / 6.0);
+    vec3 ma = middle + 0.5 * a, mb = middle + 0.5 * b, mc = middle + 0.5 * c;
     vec3 inverse = 1.0 / vec3(dot(ma, ma), dot(mb, mb), dot(mc, mc));
     return dot(middle_heights * inverse, inverse) * (1.0 / 3.0);
-}
-
-// The part above the horizon of a far triangle of which one corner, a, is on the other side than b and c.
-// Returns the share of the triangle times the mean of its integrand, 1/m^3.
-float far_corner_integrand(vec3 a, vec3 b, vec3 c, vec3 heights) {
-    float t_b = heights.x / (heights.x - heights.y);
-    float t_c = heights.x / (heights.x - heights.z);
-    return t_b * t_c * far_integrand(a, a + (b - a) * t_b, a + (c - a) * t_c, vec3(heights.x, 0.0, 0.0));
-}
-
-// Mean of height / distance^4 over the part of a far triangle above the horizon, times that part's share, 1/m^3.
-float clipped_far_integrand(vec3 a, vec3 b, vec3 c, vec3 heights) {
-    bvec3 above = greaterThan(heights, vec3(0.0));
-    int count = int(above.x) + int(above.y) + int(above.z);
-    if (count == 3) {
-        return far_integrand(a, b, c, heights);
-    }
-    // The corner that stands alone comes first.
-    bool lone_above = count == 1;
-    if (above.y == lone_above) {
-        return lone_above ? far_corner_integrand(b, c, a, heights.yzx)
-            : far_integrand(a, b, c, heights) - far_corner_integrand(b, c, a, heights.yzx);
-    }
-    if (above.z == lone_above) {
-        return lone_above ? far_corner_integrand(c, a, b, heights.zxy)
-            : far_integrand(a, b, c, heights) - far_corner_integrand(c, a, b, heights.zxy);
-    }
-    return lone_above ? far_corner_integrand(a, b, c, heights)
-        : far_integrand(a, b, c, heights) - far_corner_integrand(a, b, c, heights);
-}
-
-// Sum over the edges above the horizon and the arc that closes the outline: 2 pi E.
-// a, b, c: m, from the point, counter-clockwise seen from the point.
-float near_irradiance(vec3 a, vec3 b, vec3 c, vec3 heights, vec3 n) {
-    bvec3 above = greaterThan(heights, vec3(0.0));
-    // Where each edge meets the horizon; used only for edges with one end above.
-    vec3 on_ab = a + (b - a) * (heights.x / (above.x != above.y ? heights.x - heights.y : 1.0));
-    vec3 on_bc = b + (c - b) * (heights.y / (above.y != above.z ? heights.y - heights.z : 1.0));
-    vec3 on_ca = c + (a - c) * (heights.z / (above.z != above.x ? heights.z - heights.x : 1.0));
-    float sum = 0.0;
-    if (above.x || above.y) {
-        sum += edge_irradiance(above.y ? b : on_ab, above.x ? a : on_ab, n);
-    }
-    if (above.y || above.z) {
-        sum += edge_irradiance(above.z ? c : on_bc, above.y ? b : on_bc, n);
-    }
-    if (above.z || above.x) {
-        sum += edge_irradiance(above.x ? a : on_ca, above.z ? c : on_ca, n);
-    }
-    if (!all(above)) {
-        vec3 exit_point = above.x && !above.y ? on_ab : above.y && !above.z ? on_bc : on_ca;
-        vec3 entry_point = !above.x && above.y ? on_ab : !above.y && above.z ? on_bc : on_ca;
-        sum += horizon_arc(exit_point, entry_point);
-    }
-    return sum;
 }
 
 // Share of the hemisphere over p with normal n that a triangle fills, cosine-weighted, clipped at the horizon; in
@@ -133,12 +77,39 @@ float triangle_form_factor(
     if (!(plane_distance_area > 0.0) || max(max(heights.x, heights.y), heights.z) <= 0.0) {
         return 0.0;
     }
+    // The corner that is alone on its side of the horizon comes first. Software renderers run every branch, so what
+    // differs between the cases is chosen and the rest is shared.
+    bvec3 above = greaterThan(heights, vec3(0.0));
+    int count = int(above.x) + int(above.y) + int(above.z);
+    bool whole = count == 3, lone_above = count == 1;
+    bool second = !whole && above.y == lone_above && above.x != lone_above;
+    bool third = !whole && above.z == lone_above && above.x != lone_above;
+    mat3 corners = mat3(a, b, c);
+    a = second ? corners[1] : third ? corners[2] : corners[0];
+    b = second ? corners[2] : third ? corners[0] : corners[1];
+    c = second ? corners[0] : third ? corners[1] : corners[2];
+    heights = second ? heights.yzx : third ? heights.zxy : heights;
+    float t_b = heights.x / (whole ? 1.0 : heights.x - heights.y);
+    float t_c = heights.x / (whole ? 1.0 : heights.x - heights.z);
+    vec3 on_ab = a + (b - a) * t_b, on_ac = a + (c - a) * t_c;
+
     vec3 middle = (a + b + c) * (1.0 / 3.0);
     float far = FORM_FACTOR_FAR * bounding_radius;
     if (dot(middle, middle) > far * far) {
-        return max(clipped_far_integrand(a, b, c, heights) * plane_distance_area * (1.0 / FORM_FACTOR_PI), 0.0);
+        float all_of_it = far_integrand(a, b, c, heights);
+        float corner = t_b * t_c * far_integrand(a, on_ab, on_ac, vec3(heights.x, 0.0, 0.0));
+        float integrand = whole ? all_of_it : lone_above ? corner : all_of_it - corner;
+        return max(integrand * plane_distance_area * (1.0 / FORM_FACTOR_PI), 0.0);
     }
-    return clamp(near_irradiance(a, b, c, heights, n) * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);
+    // Outline q0 q1 q2 q3 with the arc along the horizon, if any, from q2 to q3; repeated corners add nothing.
+    vec3 q0 = whole || lone_above ? a : b;
+    vec3 q1 = lone_above ? a : whole ? b : c;
+    vec3 q2 = whole ? c : lone_above ? on_ab : on_ac;
+    vec3 q3 = whole ? c : lone_above ? on_ac : on_ab;
+    vec4 squared = vec4(dot(q0, q0), dot(q1, q1), dot(q2, q2), dot(q3, q3));
+    float sum = horizon_arc(q2, q3) + edge_irradiance(q1, q0, squared.y, squared.x, n)
+        + edge_irradiance(q2, q1, squared.z, squared.y, n) + edge_irradiance(q0, q3, squared.x, squared.w, n);
+    return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);
 }
 
 // The same for a triangle whose bounding radius is not stored.
