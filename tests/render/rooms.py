@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
-from vlm_addon.core.scene import DIFFUSE, POINT, UNTAGGED, Camera, Light, Material, Mesh, SceneSnapshot
+from vlm_addon.core.scene import DIFFUSE, POINT, UNTAGGED, Camera, Float64, Light, Material, Mesh, SceneSnapshot
 
 Vector = Sequence[float]
 
@@ -53,7 +53,10 @@ def facing_camera(distance: float = 2.0, **values: object) -> Camera:
 
 def box_room(offset: Vector = (0.0, 0.0, 0.0)) -> SceneSnapshot:
     """A white room of 2 m, open to the camera, with a red and a green wall, a lamp and a tagged glowing quad."""
-    o = np.asarray(offset, float)
+
+    def at(x: float, y: float, z: float) -> Float64:
+        return np.add(offset, (x, y, z))
+
     materials = (
         Material("white", DIFFUSE, (0.8, 0.8, 0.8)),
         Material("red", DIFFUSE, (0.8, 0.05, 0.05)),
@@ -61,15 +64,15 @@ def box_room(offset: Vector = (0.0, 0.0, 0.0)) -> SceneSnapshot:
         Material("glow", DIFFUSE, (0.0, 0.0, 0.0), emission=(2.0, 2.0, 2.0)),
     )
     meshes = (
-        quad(o + (0, 0, 0), (2, 0, 0), (0, 2, 0), name="floor"),
-        quad(o + (0, 2, 2), (2, 0, 0), (0, -2, 0), name="ceiling"),
-        quad(o + (0, 2, 0), (2, 0, 0), (0, 0, 2), name="back"),
-        quad(o + (0, 0, 0), (0, 2, 0), (0, 0, 2), material=1, name="left"),
-        quad(o + (2, 2, 0), (0, -2, 0), (0, 0, 2), material=2, name="right"),
-        quad(o + (0.7, 1.3, 1.99), (0.6, 0, 0), (0, -0.6, 0), material=3, tag_id=5, name="glow"),
+        quad(at(0, 0, 0), (2, 0, 0), (0, 2, 0), name="floor"),
+        quad(at(0, 2, 2), (2, 0, 0), (0, -2, 0), name="ceiling"),
+        quad(at(0, 2, 0), (2, 0, 0), (0, 0, 2), name="back"),
+        quad(at(0, 0, 0), (0, 2, 0), (0, 0, 2), material=1, name="left"),
+        quad(at(2, 2, 0), (0, -2, 0), (0, 0, 2), material=2, name="right"),
+        quad(at(0.7, 1.3, 1.99), (0.6, 0, 0), (0, -0.6, 0), material=3, tag_id=5, name="glow"),
     )
-    lamp = Light("lamp", POINT, (40.0, 40.0, 40.0), tuple(o + (1.0, 1.0, 1.5)))
-    camera = camera_at(o + (1, -3, 1), o + (1, 1, 1), lens=35.0)
+    lamp = Light("lamp", POINT, (40.0, 40.0, 40.0), tuple(at(1.0, 1.0, 1.5)))
+    camera = camera_at(at(1, -3, 1), at(1, 1, 1), lens=35.0)
     return SceneSnapshot("box room", meshes, materials, lights=(lamp,), camera=camera)
 
 

@@ -102,11 +102,14 @@ class RenderProcess:
             if not self._greeted:
                 self._greet(progress)
             self._number += 1
+            self._remove_arrays()
             self._send(snapshot, light_mesh, settings)
             return self._answer(progress)
         except DeviceError:
             self.close()
             raise
+        finally:
+            self._remove_arrays()
 
     def close(self) -> None:
         """Ends the child and removes the files; a second call does nothing."""
@@ -121,6 +124,12 @@ class RenderProcess:
             self._child.wait()
         self._reader.join(SHUTDOWN_S)
         self._remove_files()
+
+    def _remove_arrays(self) -> None:
+        """Removes what earlier pictures left; where the child still maps a file (Windows), a later call will."""
+        for path in self._folder.glob("*.bin"):
+            with contextlib.suppress(OSError):
+                path.unlink()
 
     def _remove_files(self) -> None:
         self._log.close()
@@ -168,11 +177,7 @@ class RenderProcess:
         answer = self._next(progress)
         if answer.get("type") != "frame":
             raise DeviceError(f"the render process answered {answer.get('type')!r} instead of a frame; render again")
-        path = self._folder / answer["file"]
-        images = [np.array(array) for array in map_arrays(path, answer["arrays"])]
-        for number_file in (path, self._folder / f"scene-{self._number}.bin"):
-            with contextlib.suppress(OSError):
-                number_file.unlink()
+        images = [np.array(array) for array in map_arrays(self._folder / answer["file"], answer["arrays"])]
         tree = unflatten(answer["frame"], images)
         return Frame(
             images=tree["images"],
@@ -184,7 +189,18 @@ class RenderProcess:
         )
 
     def _next(self, progress: Progress) -> dict[str, Any]:
-        """The child's next message that is no progress. Raises what it reports, or DeviceError."""
+        """The child's next message about this picture that is no progress. Raises what it reports, or DeviceError."""
+        try:
+            return self._next_while(progress)
+        except VlmError:
+            raise
+        except BaseException:
+            # `progress` raised: nobody waits for this picture any more.
+            if self._greeted:
+                self._write({"type": "cancel"})
+            raise
+
+    def _next_while(self, progress: Progress) -> dict[str, Any]:
         fraction, label, silence_s, asked_to_cancel = 0.0, "start renderer", 0.0, False
         while True:
             try:
@@ -200,6 +216,8 @@ class RenderProcess:
                     raise self._ended()
                 if isinstance(message, VlmError):
                     raise message
+                if message.get("number", self._number) != self._number:
+                    continue
                 if message["type"] == "error":
                     raise ERROR_KINDS.get(message["kind"], VlmError)(*message["parts"])
                 if message["type"] != "progress":

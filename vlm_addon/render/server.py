@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..core.array_codec import flatten, unflatten
-from ..core.errors import Cancelled, InvalidInput, VlmError
+from ..core.errors import Cancelled, DeviceError, InvalidInput, VlmError
 from ..core.scene_codec import light_mesh_from_tree, snapshot_from_tree
 from .device import Device
 from .frame_types import RenderSettings
@@ -52,12 +52,17 @@ class _Server:
         self._folder = folder
         self._answers = answers
         self._cancelled = threading.Event()
+        self._number = 0
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
         """Takes messages while a picture is being rendered; without a parent there is nobody to render for."""
         while True:
-            message = read_message(sys.stdin.buffer)
+            try:
+                message = read_message(sys.stdin.buffer)
+            except DeviceError as error:
+                print(error, file=sys.stderr, flush=True)
+                os._exit(1)
             if message is None:
                 os._exit(0)
             if message["type"] == "cancel":
@@ -68,14 +73,18 @@ class _Server:
 
     def answer(self, request: dict[str, Any]) -> None:
         """Renders one picture and sends it, or the error in its place."""
+        self._number = request["number"]
         try:
-            write_message(self._answers, self._render(request))
+            self._send(self._render(request))
         except VlmError as error:
-            write_message(self._answers, _error_message(error))
+            self._send(_error_message(error))
         except Exception as error:  # noqa: BLE001  a bug in one picture must not end the process silently
             traceback.print_exc()
             failure = VlmError(f"renderer: {type(error).__name__}: {error}; please report it with the log")
-            write_message(self._answers, _error_message(failure))
+            self._send(_error_message(failure))
+
+    def _send(self, message: dict[str, Any]) -> None:
+        write_message(self._answers, {**message, "number": self._number})
 
     def _render(self, request: dict[str, Any]) -> dict[str, Any]:
         arrays = map_arrays(self._folder / request["file"], request["arrays"])
@@ -92,7 +101,7 @@ class _Server:
         return {"type": "frame", "frame": answer, "file": file, "arrays": store_arrays(self._folder / file, images)}
 
     def _progress(self, fraction: float, label: str) -> bool:
-        write_message(self._answers, {"type": "progress", "fraction": fraction, "label": label})
+        self._send({"type": "progress", "fraction": fraction, "label": label})
         return not self._cancelled.is_set()
 
 
