@@ -188,9 +188,15 @@ def test_result_does_not_depend_on_the_run() -> None:
     np.testing.assert_array_equal(first.samples.positions, second.samples.positions)
 
 
-def test_progress_can_cancel() -> None:
+@pytest.mark.parametrize("last", [0.0, 0.05, 0.2, 0.4, 0.65, 0.8, 0.92])
+def test_progress_can_cancel_at_any_step(last: float) -> None:
+    seen: list[float] = []
     with pytest.raises(Cancelled):
-        create_light_mesh([mesh_of(*SPHERE)], SimplifySettings(100), lambda fraction, label: fraction < 0.5)
+        create_light_mesh(
+            [mesh_of(*SPHERE)], SimplifySettings(100), lambda fraction, label: seen.append(fraction) or fraction <= last
+        )
+    assert seen[-1] > last
+    assert all(fraction <= last for fraction in seen[:-1])
 
 
 def test_progress_never_goes_back() -> None:

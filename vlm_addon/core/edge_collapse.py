@@ -10,6 +10,7 @@ array operations do fast; the loss against one edge at a time is small because e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,18 +83,26 @@ class _Edges:
 
 
 def collapse_edges(
-    positions: Float64, triangles: Int64, group: Int64, weight: Float64, target: int, normals: Float64 | None = None
+    positions: Float64,
+    triangles: Int64,
+    group: Int64,
+    weight: Float64,
+    target: int,
+    normals: Float64 | None = None,
+    report: Callable[[float], None] = lambda share: None,
 ) -> CollapsedMesh:
     """At most `target` triangles where the topology allows it, and at most one or two fewer than that.
 
     positions: (v, 3), an oriented manifold with border (mesh_topology.cut_to_manifold). group: (t,) int64,
     triangles of different groups keep the line between them. weight: (t,) importance, for example reflected power.
-    normals: (t, 3) directions from which no triangle may turn away; of the triangles themselves if not given.
+    normals: (t, 3) directions from which no triangle may turn away; of the triangles themselves if not given. report:
+    called with the share of the work that is done, may raise.
     """
     state = _initial_state(positions, triangles, group, weight, normals)
     level = 0
     while len(state.triangles) > target and level < len(RULES):
         rules = RULES[level]
+        report(np.log(len(triangles) / len(state.triangles)) / np.log(len(triangles) / target))
         excess = len(state.triangles) - target
         advanced = _collapse_pass(state, rules, excess, BATCH_SHARE) or _collapse_pass(state, rules, excess, 1.0)
         if advanced is None:

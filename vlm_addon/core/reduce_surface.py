@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +42,13 @@ class ReducedSurface:
     merged_borders: bool
 
 
-def reduce_surface(surface: SourceSurface, target: int) -> ReducedSurface:
-    """At most `target` triangles; all with area where the surface has no more than that."""
+def reduce_surface(
+    surface: SourceSurface, target: int, report: Callable[[float], None] = lambda share: None
+) -> ReducedSurface:
+    """At most `target` triangles; all with area where the surface has no more than that.
+
+    report: called with the share of the work that is done, may raise.
+    """
     solid = surface.areas > LEAST_AREA * surface.diagonal**2
     if int(solid.sum()) <= target:
         return _selected(surface, solid)
@@ -61,7 +67,7 @@ def reduce_surface(surface: SourceSurface, target: int) -> ReducedSurface:
     centre, size = surface.positions[used].mean(axis=0), surface.diagonal
     positions = (start.positions[used] - centre) / size
     power = weight[left] * _areas(positions, triangles)
-    collapsed = collapse_edges(positions, triangles, surface.group[left], power, target, surface.normals[left])
+    collapsed = collapse_edges(positions, triangles, surface.group[left], power, target, surface.normals[left], report)
     collapsed = _within_budget(collapsed, surface, left, target)
     number = np.full(len(surface.positions), -1, np.int64)
     number[used] = np.arange(len(used))

@@ -20,7 +20,7 @@ from .source_surface import SourceSurface
 from .triangle_tree import morton_codes
 
 # Lights before and after a dropped shell on the Z-order curve among which its triangles choose.
-ADOPTION_WINDOW = 16
+ADOPTION_WINDOW = 8
 # Some ten candidates each.
 ROWS_PER_BATCH = 1 << 16
 

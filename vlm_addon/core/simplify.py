@@ -128,7 +128,9 @@ def create_light_mesh(
     clock.start(0.0, "weld")
     surface = join_surface(meshes)
     clock.start(0.1, "simplify")
-    lights = reduce_surface(surface, settings.target_triangles)
+    lights = reduce_surface(
+        surface, settings.target_triangles, lambda share: step(progress, 0.1 + 0.5 * share, "simplify")
+    )
     if not len(lights.triangles):
         clock.stop()
         return _nothing(meshes, surface, clock)
