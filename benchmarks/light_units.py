@@ -33,6 +33,7 @@ OUT = Path("build/light_units")
 WIDTH_PX = 320
 SAMPLES = 16
 REFERENCE_SAMPLES = 128
+SHADOW_SAMPLES = 64
 DIM_SHARE = 0.01
 EDGE_JUMP = 0.25
 BAND_PX = 3
@@ -121,7 +122,12 @@ def _compare(device: Device, scene: str, model: str, lamp: str, arguments: argpa
     width = arguments.width
     height = round(width * render.resolution_y / render.resolution_x)
     settings = RenderSettings(
-        width, height, "direct", samples=arguments.samples, shadow_resolution=arguments.shadow_resolution
+        width,
+        height,
+        "direct",
+        samples=arguments.samples,
+        shadow_resolution=arguments.shadow_resolution,
+        shadow_samples=SHADOW_SAMPLES,
     )
     with quiet():
         snapshot = extract_scene()

@@ -73,6 +73,8 @@ def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of the technique")
     command.add_argument("--size", type=_size, metavar="WxH", help="pixels; as the scene says without")
     command.add_argument("--samples", type=int, default=16, metavar="N", help="jittered pictures averaged (16)")
+    shadow_help = "points of each soft lamp, for its penumbra (32)"
+    command.add_argument("--shadow-samples", type=int, default=32, metavar="N", help=shadow_help)
     command.add_argument("--view", metavar="NAME", help="view transform of a PNG; the scene's without")
     command.add_argument("--out", type=Path, required=True, metavar="IMG", help=".exr (linear Rec.709) or .png")
     command.add_argument("--buffers", type=Path, metavar="DIR", help="every intermediate image as EXR into a folder")

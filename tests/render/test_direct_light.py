@@ -28,7 +28,7 @@ from vlm_addon.core.scene import (
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.passes.accumulate import read_image
-from vlm_addon.render.passes.direct_light import LEAST_SOFT_POINTS, DirectLightPass
+from vlm_addon.render.passes.direct_light import DirectLightPass
 from vlm_addon.render.passes.gbuffer import GBufferPass
 from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.render.view import make_view
@@ -49,6 +49,8 @@ LAMPS = {
     "area": Light("l", AREA, (10.0, 20.0, 30.0), (0.5, 1.0, 1.5), **SIDEWAYS, size_x=1.0, size_y=0.5),
 }
 
+SOFT_POINTS = 64
+
 
 def rendered(
     device: Device, lights: list[Light], material: Material, camera: Camera = CAMERA
@@ -61,7 +63,7 @@ def rendered(
         gbuffer = GBufferPass(context, device.shaders, WIDTH, HEIGHT).render(geometry, view, 0)
         shadows = LampShadows(context, device.shaders, geometry, snapshot.lights, 256)
         direct = DirectLightPass(context, device.shaders, WIDTH, HEIGHT)
-        radiance = read_image(direct.render(gbuffer, shadows, view, 0, 1))[..., :3].astype(np.float64)
+        radiance = read_image(direct.render(gbuffer, shadows, view, 0, 1, SOFT_POINTS))[..., :3].astype(np.float64)
         position = read_image(gbuffer.position)[..., :3].astype(np.float64) + geometry.origin
     backward = camera.matrix_world[:3, 2]
     to_eye = camera.matrix_world[:3, 3] - position
@@ -138,7 +140,7 @@ def test_one_picture_alone_has_enough_points_of_a_soft_lamp(device: Device) -> N
         gbuffer = GBufferPass(context, device.shaders, 128, 8).render(geometry, view, 0)
         shadows = LampShadows(context, device.shaders, geometry, snapshot.lights, 512)
         direct = DirectLightPass(context, device.shaders, 128, 8)
-        row = read_image(direct.render(gbuffer, shadows, view, 0, 1))[4, :, 0]
+        row = read_image(direct.render(gbuffer, shadows, view, 0, 1, SOFT_POINTS))[4, :, 0]
     steps = np.abs(np.diff(row)) / row.max()
-    assert steps.max() < 6.0 / np.sqrt(LEAST_SOFT_POINTS) / 4.0
+    assert steps.max() < 6.0 / np.sqrt(SOFT_POINTS) / 4.0
     assert row.min() < 0.1 * row.max()

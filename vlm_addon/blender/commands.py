@@ -104,6 +104,7 @@ def render_command(arguments: Namespace) -> None:
         technique=arguments.technique,
         technique_settings=settings,
         samples=arguments.samples,
+        shadow_samples=arguments.shadow_samples,
         buffers=arguments.buffers is not None,
     )
     frame = _rendered(found, frame_settings, TerminalProgress())

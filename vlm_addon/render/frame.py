@@ -62,7 +62,7 @@ def render_frame(
         with timer.measure("G-buffer"):
             gbuffer = gbuffer_pass.render(geometry, view, sample)
         with timer.measure("direct light"):
-            direct = direct_light.render(gbuffer, shadows, view, sample, settings.samples)
+            direct = direct_light.render(gbuffer, shadows, view, sample, settings.samples, settings.shadow_samples)
         share = (1.0 - PREPARED) / settings.samples
         sample_progress = _within(progress, PREPARED + sample * share, share)
         irradiance = technique.indirect(FrameInputs(view, gbuffer, sample, sample_progress))

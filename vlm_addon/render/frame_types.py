@@ -15,8 +15,8 @@ class RenderSettings:
     """Size, technique and quality of one frame.
 
     technique_settings: values by name, checked against the technique's own settings dataclass. samples: jittered
-    pictures averaged per pixel (box filter of one pixel). shadow_samples: points per soft light that phase one
-    averages. buffers: also return every intermediate image.
+    pictures averaged per pixel (box filter of one pixel). shadow_samples: points of a
+    soft lamp, in phase one and at least in the finished picture. buffers: also return every intermediate image.
     """
 
     width: int
@@ -25,7 +25,7 @@ class RenderSettings:
     technique_settings: Mapping[str, Any] = field(default_factory=dict)
     samples: int = 16
     shadow_resolution: int = 1024
-    shadow_samples: int = 16
+    shadow_samples: int = 32
     buffers: bool = False
 
 

@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     import moderngl
 
 
-# Points of a soft lamp in a finished frame, at least: fewer show as steps in its penumbra.
-LEAST_SOFT_POINTS = 64
-
-
 class DirectLightPass:
     """Diffuse and specular reflection of every lamp, one draw for each, with filtered shadows.
 
@@ -35,11 +31,18 @@ class DirectLightPass:
         self._albedo = AlbedoTexture(context)
 
     def render(
-        self, gbuffer: GBuffer, shadows: LampShadows, view: View, sample_index: int, sample_count: int
+        self,
+        gbuffer: GBuffer,
+        shadows: LampShadows,
+        view: View,
+        sample_index: int,
+        sample_count: int,
+        shadow_samples: int,
     ) -> moderngl.Texture:
         """Radiance in W/(m² sr) that each pixel sends to the eye, RGBA32F with w 0; 0 where no surface shows.
 
-        The next call overwrites the texture.
+        Over all samples a soft lamp gets at least `shadow_samples` points: few show as steps in its penumbra. The
+        next call overwrites the texture.
         """
         self._framebuffer.clear()
         self._albedo.bind()
@@ -51,7 +54,7 @@ class DirectLightPass:
         set_uniforms(self._fullscreen.program, camera)
         for lamp in range(len(shadows.lights)):
             # A picture of few samples still gets enough points of each soft lamp.
-            together = shadows.samples_of(lamp, -(-LEAST_SOFT_POINTS // sample_count))
+            together = shadows.samples_of(lamp, -(-shadow_samples // sample_count))
             for part in range(together):
                 index = sample_index * together + part
                 shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together)
