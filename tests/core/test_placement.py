@@ -12,7 +12,10 @@ from tests.core.surface_shapes import areas_of, cube, grid, icosphere, mesh_of, 
 from vlm_addon.core.form_factor import paired_form_factor
 from vlm_addon.core.mesh_topology import Rows, rows_by_key
 from vlm_addon.core.placement import INSET_SHARE, insets, intrusions, place_behind, share_in_front
+from vlm_addon.core.reduce_surface import reduce_surface
+from vlm_addon.core.regions import assign_regions
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
+from vlm_addon.core.source_surface import join_surface
 from vlm_addon.core.triangle_tree import build_tree
 
 
@@ -121,19 +124,20 @@ def test_tree_agrees_with_every_triangle_tried() -> None:
 
 @settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), target=st.integers(8, 120))
-def test_placement_turns_nothing_over_and_only_improves(seed: int, target: int) -> None:
+def test_placement_turns_nothing_over_and_clears_most_of_the_surface(seed: int, target: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.uniform(1, 5, 2)
     positions, triangles = sheet(lambda x, y: 0.15 * np.sin(a * x) * np.cos(b * y), 20, 20)
-    created = create_light_mesh([mesh_of(positions, triangles)], SimplifySettings(target))
-    corners = created.light_mesh.corners
-    assert np.isfinite(corners).all()
-    assert (created.light_mesh.areas > 0).all()
-    source = normals_of(positions[triangles])
-    light = created.light_of_triangle[0]
-    mean = np.stack([np.bincount(light, source[:, k], len(corners)) for k in range(3)], axis=1)
-    assert (np.einsum("ij,ij->i", normals_of(corners), mean) > 0).mean() > 0.98
-    assert created.report.share_in_front < 0.05
+    surface = join_surface([mesh_of(positions, triangles)])
+    lights = reduce_surface(surface, target)
+    regions = rows_by_key(assign_regions(surface, lights).light, len(lights.triangles))
+    placed = place_behind(lights.positions, lights.triangles, regions, surface.corners)
+    before, after = lights.positions[lights.triangles], placed.positions[lights.triangles]
+    assert (np.einsum("ij,ij->i", normals_of(before), normals_of(after)) > 0).all()
+    assert areas_of(placed.positions, lights.triangles).min() > 0
+    in_front = [share_in_front(corners, regions, surface.corners) for corners in (before, after)]
+    # About half of a wavy surface lies behind chords through it; typically 0.1 % stays, with 8 lights sometimes more.
+    assert in_front[1] < 0.25 * in_front[0]
 
 
 @pytest.mark.parametrize(("shape", "target"), [(icosphere(4), 100), (icosphere(4), 1000), (cube(10)[:2], 60)])
