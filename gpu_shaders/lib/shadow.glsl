@@ -8,10 +8,14 @@
 #define LIB_SHADOW
 #include "gpu_layout/Lamp"
 
-// Slack in depth, in texels: against the receiver's plane, and against the receiver itself. The second lets a wall
-// that rises next to the receiver pass within the filter's footprint.
-#define SHADOW_PLANE_SLACK 0.25
-#define SHADOW_POINT_SLACK 1.0
+// Depths in texels. Behind the receiver's plane by more than the first: the map looks past an edge of the receiver
+// there and knows nothing of it. Before the plane, but not before the receiver itself by more than the second: perhaps
+// a wall that rises next to it.
+#define SHADOW_BEYOND 0.05
+#define SHADOW_POINT_SLACK 0.5
+// What float32 leaves between a plane and its own depths in the map.
+#define SHADOW_ON_PLANE 5e-3
+
 // Tiles of a cube's six faces in the map: +x -x +y / -y +z -z.
 #define SHADOW_CUBE_TILES vec2(3.0, 2.0)
 
@@ -44,15 +48,20 @@ ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
 
 // Share in [0, 1] of a texel's area around p in which nothing stands before the receiver's plane.
 // p: m from the local origin; n: unit geometric normal on the lit side. map: of `lamp`, in texels without filter.
-float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n) {
+// tilt: how far the surface around p may lean away from n within a texel, radians.
+float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     if (lamp.shadow_kind == SHADOW_NONE) {
         return 1.0;
     }
     bool parallel = lamp.shadow_kind == SHADOW_PARALLEL;
     vec3 to_lamp = lamp.kind == LAMP_SUN ? lamp.sample_position : lamp.sample_position - p;
-    if (dot(n, to_lamp) <= 0.0) {
+    float cos_lamp = dot(n, to_lamp) * inversesqrt(max(dot(to_lamp, to_lamp), 1e-30));
+    if (cos_lamp <= 0.0) {
         return 0.0;
     }
+    // Depth grows with the tangent of the angle of incidence, its change with the square of one over the cosine.
+    float steepness = 1.0 / max(cos_lamp * cos_lamp, 1e-4);
+    float leaning = tilt * steepness;
     ShadowPoint receiver = shadow_point(lamp, p, n);
     vec2 tiles = lamp.shadow_kind == SHADOW_CUBE ? SHADOW_CUBE_TILES : vec2(1.0);
     vec2 map_size = vec2(textureSize(map, 0));
@@ -62,7 +71,7 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n) {
     vec2 uv;
     vec2 gradient;      // of the plane's nearness, per unit of uv
     float nearness;
-    float slack;        // of nearness, per texel of depth
+    float slack;        // nearness per texel of depth
     vec3 q = receiver.position;
     if (parallel) {
         uv = q.xy - lamp.shadow_centre;
@@ -84,9 +93,21 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n) {
     vec2 step_u = gradient * texel;
     float at_corner = nearness + dot(gradient, to_corner);
     vec4 plane = at_corner + vec4(step_u.y, step_u.x + step_u.y, step_u.x, 0.0);
-    vec4 limit = max(plane + SHADOW_PLANE_SLACK * slack, nearness + SHADOW_POINT_SLACK * slack);
-    vec4 lit = vec4(lessThanEqual(stored, limit));
-    vec2 row = mix(lit.wx, lit.zy, fraction.x);
-    return mix(row.x, row.y, fraction.y);
+    vec4 weights = vec4(1.0 - fraction.x, fraction.x, fraction.x, 1.0 - fraction.x)
+        * vec4(fraction.y, fraction.y, 1.0 - fraction.y, 1.0 - fraction.y);
+    vec4 depth = (stored - plane) / slack;
+    vec4 clearly = vec4(greaterThan(stored, vec4(nearness + SHADOW_POINT_SLACK * slack)));
+    vec4 before = vec4(greaterThan(depth, vec4(leaning)));
+    float blocked = dot(weights, before * clearly);
+    // Where an occluder meets the receiver it is for a moment just before it; only what lies on the plane itself then
+    // tells of the receiver.
+    float nearest = blocked > 0.0 ? SHADOW_ON_PLANE * steepness : leaning;
+    vec4 on_it = vec4(lessThanEqual(depth, vec4(nearest))) * vec4(greaterThanEqual(depth, vec4(-SHADOW_BEYOND - leaning)));
+    float seen = dot(weights, on_it);
+    if (seen > 0.0) {
+        return seen / (seen + blocked);
+    }
+    // Nothing of the receiver shows here: it is hidden, or too thin for the map.
+    return dot(weights, before) > 0.0 ? 0.0 : 1.0;
 }
 #endif

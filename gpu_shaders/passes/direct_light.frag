@@ -5,6 +5,9 @@
 #include "lib/lights.glsl"
 #include "lib/shadow.glsl"
 
+// Between neighbouring facets of a curved surface, radians; the normal of each is exact.
+#define FACET_TILT 0.05
+
 layout(std430, binding = LAMP_BINDING) readonly buffer Lamps { Lamp lamps[]; };
 layout(binding = SHADOW_MAP_UNIT) uniform sampler2D shadow_map;
 
@@ -31,7 +34,7 @@ void main() {
     if (max(max(irradiance.r, irradiance.g), irradiance.b) <= 0.0 && specular_irradiance == vec3(0.0)) {
         return;
     }
-    float lit = lit_share(shadow_map, lamp, position, geometric_normal);
+    float lit = lit_share(shadow_map, lamp, position, geometric_normal, FACET_TILT);
     if (lit <= 0.0) {
         return;
     }

@@ -5,6 +5,9 @@
 #include "lib/lights.glsl"
 #include "lib/shadow.glsl"
 
+// Source samples have smooth normals, which lean away from their facets; radians.
+#define NORMAL_TILT 0.2
+
 layout(local_size_x = GROUP_SIZE) in;
 
 layout(std430, binding = LAMP_BINDING) readonly buffer Lamps { Lamp lamps[]; };
@@ -28,7 +31,7 @@ void main() {
         SourceSample source = source_samples[i];
         vec3 unshadowed = lamp_irradiance(lamp, source.position, source.normal);
         if (max(max(unshadowed.r, unshadowed.g), unshadowed.b) > 0.0) {
-            irradiance += source.weight * lit_share(shadow_map, lamp, source.position, source.normal) * unshadowed;
+            irradiance += source.weight * lit_share(shadow_map, lamp, source.position, source.normal, NORMAL_TILT) * unshadowed;
         }
     }
     radiosities[index].rgb += share * light.reflectance * irradiance;
