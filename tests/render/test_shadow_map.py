@@ -193,6 +193,25 @@ def test_shadow_begins_at_the_foot_of_a_thin_wall(device: Device, scale: float) 
     np.testing.assert_allclose(share[200:], 1.0, rtol=1e-3)
 
 
+def test_edges_of_a_thin_walled_room_let_no_sun_in(device: Device) -> None:
+    """A room open to -y; the back wall lies in the shade of ceiling and side wall, up to where they meet."""
+    walls = [quad[::-1] for i, quad in enumerate(box([-2.0, 0.0, 0.0], [2.0, 4.0, 3.0])) if i != 2]
+    z_axis = np.array([0.5, -1.0, 0.6]) / np.linalg.norm([0.5, -1.0, 0.6])
+    x_axis = np.cross([0.0, 0.0, 1.0], z_axis) / np.linalg.norm(np.cross([0.0, 0.0, 1.0], z_axis))
+    y_axis = np.cross(z_axis, x_axis)
+    light = replace(LAMPS["sun"], x_axis=tuple(x_axis), y_axis=tuple(y_axis), z_axis=tuple(z_axis))
+    random = np.random.default_rng(12)
+    texel = 2.0 * 2.9 / (2 * RESOLUTION)
+    inset, along = random.uniform(0.0, 3.0 * texel, 5000), random.random(5000)
+    full = np.full(5000, 4.0)
+    under_ceiling = np.stack([3.6 * along - 1.8, full, 3.0 - inset], axis=1)
+    beside_wall = np.stack([2.0 - inset, full, 2.5 * along + 0.3], axis=1)
+    for points in (under_ceiling, beside_wall):
+        share = lit(device, [mesh(walls)], light, points, np.tile([0.0, -1.0, 0.0], (5000, 1)))
+        assert share[inset > 1.5 * texel].max() == 0.0
+        assert share.mean() < 0.02
+
+
 @pytest.mark.parametrize("name", ["point", "sun"])
 def test_inner_corner_of_a_room_stays_lit(device: Device, name: str) -> None:
     """Floor points close to a wall that the lamp also lights: not darkened beyond a texel from the wall."""
