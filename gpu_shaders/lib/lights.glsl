@@ -29,6 +29,9 @@ float half_circle_arctangent(float y, float x) {
 // Mean of max(0, n·l) over an evenly bright cone of directions (Snyder 1996). cosine: between n and the axis of the
 // cone; sine: of half its angle. Equals the cosine while the whole cone is above the horizon.
 float horizon_cosine(float cosine, float sine) {
+    if (sine <= 0.0) {
+        return max(cosine, 0.0);
+    }
     if (cosine >= sine) {
         return cosine;
     }

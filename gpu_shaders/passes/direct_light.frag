@@ -26,6 +26,12 @@ void main() {
         return;
     }
     Lamp lamp = lamps[0];
+    // Known when the shader is compiled: software renderers would run the branches of all kinds.
+    lamp.kind = LAMP_KIND;
+    lamp.shadow_kind = SHADOW_KIND;
+#if !HAS_RADIUS
+    lamp.radius = lamp.falloff_radius_squared = 0.0;
+#endif
     vec3 position = texelFetch(gbuffer_position, pixel, 0).xyz;
     vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
     vec3 irradiance = lamp_irradiance(lamp, position, normal);

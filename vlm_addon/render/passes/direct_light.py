@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
@@ -26,7 +28,9 @@ class DirectLightPass:
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
         self._radiance = context.texture((width, height), 4, dtype="f4")
         self._framebuffer = context.framebuffer([self._radiance])
-        self._fullscreen = FullscreenPass(context, shaders, "passes/direct_light.frag")
+        self._context = context
+        self._shaders = shaders
+        self._variants: dict[tuple[int, int, bool], FullscreenPass] = {}
         self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
         self._albedo = AlbedoTexture(context)
 
@@ -51,17 +55,16 @@ class DirectLightPass:
             "camera_backward": view.backward,
             "is_orthographic": view.is_orthographic,
         }
-        set_uniforms(self._fullscreen.program, camera)
         for lamp in range(len(shadows.lights)):
             # A picture of few samples still gets enough points of each soft lamp.
             together = shadows.samples_of(lamp, -(-shadow_samples // sample_count))
             for part in range(together):
                 index = sample_index * together + part
                 shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together)
-                self._add(gbuffer, shadow_map, 1.0 / together)
+                self._add(gbuffer, shadow_map, {**camera, "weight": 1.0 / together})
         return self._radiance
 
-    def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, weight: float) -> None:
+    def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, uniforms: dict[str, Any]) -> None:
         # New storage: llvmpipe (Mesa 22) lets a write overtake draws that still read the old one.
         self._lamp.orphan()
         self._lamp.write(shadow_map.record.tobytes())
@@ -69,5 +72,14 @@ class DirectLightPass:
         # Drawing a shadow map binds the materials' textures to the units of the G-buffer.
         gbuffer.bind()
         shadow_map.bind()
-        set_uniforms(self._fullscreen.program, {"weight": weight})
-        self._fullscreen.draw(self._framebuffer, additive=True)
+        fullscreen = self._variant(shadow_map.record[0])
+        set_uniforms(fullscreen.program, uniforms)
+        fullscreen.draw(self._framebuffer, additive=True)
+
+    def _variant(self, lamp: np.void) -> FullscreenPass:
+        """The pass compiled for lamps of this kind."""
+        key = (int(lamp["kind"]), int(lamp["shadow_kind"]), bool(lamp["radius"] > 0.0))
+        if key not in self._variants:
+            defines = dict(zip(("LAMP_KIND", "SHADOW_KIND", "HAS_RADIUS"), key, strict=True))
+            self._variants[key] = FullscreenPass(self._context, self._shaders, "passes/direct_light.frag", defines)
+        return self._variants[key]
