@@ -24,7 +24,7 @@ WALL_HEIGHT, WALL_THICKNESS = 2.5, 0.25
 PROPS, WALLS, SLIVERS, CLOTH, SHELLS, FRAMES = (0, 0), (-5, 3), (4, 3), (0, 6), (5, 7), (-4.5, 9)
 FAR_TOWER = (160, 400)
 
-SUN_IRRADIANCE, POINT_W, SPOT_W, PROP_LAMP_W = 1.2, 120.0, 400.0, 0.004
+SUN_IRRADIANCE, POINT_W, SPOT_W, PROP_LAMP_W, AREA_W = 1.2, 120.0, 400.0, 0.004, 30.0
 
 CAMERAS: tuple[tuple[str, tuple[float, float, float], tuple[float, float, float], float], ...] = (
     ("01 millimetre props", (0.028, -0.050, 0.030), (0.0, 0.0, 0.003), 50.0),
@@ -35,9 +35,14 @@ CAMERAS: tuple[tuple[str, tuple[float, float, float], tuple[float, float, float]
     ("06 cloth", (-1.9, 3.6, 1.5), (0.0, 6.0, 1.0), 35.0),
     ("07 cloth from behind", (1.9, 8.3, 1.3), (0.0, 6.0, 1.0), 35.0),
     ("08 thin shells", (3.2, 4.4, 1.5), (5.1, 7.1, 0.6), 32.0),
-    ("09 grazing", (-30.0, -6.0, 0.02), (10.0, 6.0, 0.5), 50.0),
+    ("09 grazing", (-9.0, -4.0, 0.02), (1.0, 5.0, 0.7), 35.0),
     ("10 from above", (0.0, 5.0, 26.0), (0.0, 5.5, 0.0), 30.0),
 )
+# Shares of the larger sensor side.
+SHIFTS = {"04 inner corner": (0.10, -0.15)}
+ORTHOGRAPHIC_EXTENTS = {"10 from above": 18.0}  # m
+NEAR_CLIPS = {"01 millimetre props": 0.002}  # m
+NEAR_CLIP = 0.01
 
 
 def snapped(position: Sequence[float]) -> tuple[float, ...]:
@@ -159,7 +164,7 @@ def add_station(scene: Any, parts: dict[str, Shape], centre: Sequence[float], ma
 
 
 def add_frames(scene: Any, material: Any) -> None:
-    """One shape mirrored, squashed, sheared by a parent's scale, and doubled exactly in its place."""
+    """One shape as it is, mirrored, mirrored and turned, squashed flat, and sheared by its parent's scale."""
     x, y = FRAMES
     corner = join(
         [box((0, 0, 0), (0.8, 0.25, 0.25)), box((0, 0.25, 0), (0.25, 0.6, 0.25)), box((0, 0, 0.25), (0.25, 0.25, 1.1))]
@@ -175,6 +180,31 @@ def add_frames(scene: Any, material: Any) -> None:
     parent.location, parent.scale = snapped((x, y + 1.5, 0.0)), (1.5, 0.5, 1.0)
     child = blend.add_object(scene, "Sheared corner", data)
     child.parent, child.rotation_euler = parent, (0, 0, 0.7)
+
+
+def add_lamps(scene: Any) -> None:
+    """A sun, a point without extent, a soft spot, an area lamp behind the cloth, and a speck beside the props."""
+    sun = blend.add_lamp(scene, "Sun", "SUN", SUN_IRRADIANCE, (-3, -5, 9), (0, 0, 0))
+    sun.data.angle = math.radians(0.53)
+    point = blend.add_lamp(scene, "Point", "POINT", POINT_W, snapped((-4.5, 1.5, 2.25)))
+    point.data.shadow_soft_size = 0.0
+    blend.add_spot(scene, "Spot", SPOT_W, snapped((1.5, 2.0, 4.0)), (3.5, 6.0, 0.0), 90.0, 0.3, 0.05)
+    area = blend.add_lamp(scene, "Area", "AREA", AREA_W, snapped((-1.5, 8.0, 2.25)), (0.0, 6.0, 1.0))
+    area.data.shape, area.data.size, area.data.size_y = "RECTANGLE", 0.75, 0.25
+    area.visible_camera = False
+    prop_lamp = blend.add_lamp(scene, "Prop lamp", "POINT", PROP_LAMP_W, snapped((0.02, -0.02, 0.03)))
+    prop_lamp.data.shadow_soft_size = 0.0005
+
+
+def add_cameras(scene: Any) -> None:
+    """The ten cameras; the first becomes the scene's."""
+    for name, position, target, lens in CAMERAS:
+        clip = (NEAR_CLIPS.get(name, NEAR_CLIP), 2 * FLOOR_EXTENT)
+        camera = blend.add_camera(scene, position, target, lens, name=f"Camera {name}", clip=clip)
+        camera.location = snapped(position)
+        camera.data.shift_x, camera.data.shift_y = SHIFTS.get(name, (0.0, 0.0))
+        if name in ORTHOGRAPHIC_EXTENTS:
+            camera.data.type, camera.data.ortho_scale = "ORTHO", ORTHOGRAPHIC_EXTENTS[name]
 
 
 def build() -> None:
@@ -220,14 +250,5 @@ def build() -> None:
     add_station(scene, shells, SHELLS, glossy)
     add_frames(scene, pale)
 
-    sun = blend.add_lamp(scene, "Sun", "SUN", SUN_IRRADIANCE, (-3, -5, 9), (0, 0, 0))
-    sun.data.angle = math.radians(0.53)
-    point = blend.add_lamp(scene, "Point", "POINT", POINT_W, snapped((-4.5, 1.5, 2.25)))
-    point.data.shadow_soft_size = 0.0
-    blend.add_spot(scene, "Spot", SPOT_W, snapped((1.5, 2.0, 4.0)), (3.5, 6.0, 0.0), 90.0, 0.3, 0.05)
-    prop_lamp = blend.add_lamp(scene, "Prop lamp", "POINT", PROP_LAMP_W, snapped((0.02, -0.02, 0.03)))
-    prop_lamp.data.shadow_soft_size = 0.0005
-    for name, position, target, lens in CAMERAS:
-        near = 0.002 if "millimetre" in name else 0.01
-        camera = blend.add_camera(scene, position, target, lens, name=f"Camera {name}", clip=(near, 2 * FLOOR_EXTENT))
-        camera.location = snapped(position)
+    add_lamps(scene)
+    add_cameras(scene)
