@@ -14,7 +14,7 @@ from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, Materia
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
-from vlm_addon.render.passes.shadow_map import LampShadows, shadow_kind
+from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass, shadow_kind
 
 RESOLUTION = 512
 SCALES = [1e-3, 1.0, 1e3]
@@ -237,6 +237,13 @@ def test_sides_of_a_cube_map_meet_without_a_seam(device: Device) -> None:
     along = np.linspace(-0.95, 0.95, 400)
     points = np.stack([along, along, np.full(400, -1.0)], axis=1)
     np.testing.assert_allclose(lit(device, [mesh(walls)], light, points, up(400)), 1.0, rtol=1e-3)
+
+
+def test_resolution_beyond_the_device_is_cut_to_it(device: Device) -> None:
+    with device.current() as context:
+        shadows = ShadowMapPass(context, device.shaders, 10**6)
+        for light in LAMPS.values():
+            assert max(shadows.size(light)) <= context.info["GL_MAX_TEXTURE_SIZE"]
 
 
 def test_kinds_of_maps() -> None:

@@ -63,7 +63,8 @@ class ShadowMapPass:
         self._context = context
         self._opaque = shaders.program(VERTEX, FRAGMENT)
         self._shaders = shaders
-        self._resolution = resolution
+        # The largest map, three tiles wide, must fit a texture.
+        self._resolution = min(resolution, int(context.info["GL_MAX_TEXTURE_SIZE"]) // max(CUBE_TILES))
         self._empty = self._new_texture((2, 2))
         context.framebuffer([self._empty]).clear()
 
