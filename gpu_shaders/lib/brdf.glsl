@@ -9,8 +9,6 @@
 #define LEAST_ALPHA 1e-4
 // Variance of half vectors over a small light, per steradian, as an addition to alpha squared.
 #define LIGHT_SPREAD 0.1
-// Blender's own bound, so that the index of refraction stays finite.
-#define MAX_F0 0.99
 
 // What is the same for all lights that fall on a surface seen from one direction.
 struct Reflector {

@@ -7,8 +7,6 @@
 
 // From this many radii on a cell of an area lamp is a point: the square of its inverse is the error.
 #define AREA_LAMP_FAR 64.0
-// Below this sine a cone of directions is as flat as a disk.
-#define NARROW_CONE 0.03
 
 // What reaches a point from one sample of a lamp.
 struct LampRay {

@@ -16,9 +16,6 @@
 // What float32 leaves between a plane and its own depths in the map.
 #define SHADOW_ON_PLANE 5e-3
 
-// Tiles of a cube's six faces in the map: +x -x +y / -y +z -z.
-#define SHADOW_CUBE_TILES vec2(3.0, 2.0)
-
 struct ShadowPoint {
     vec3 position;  // along a face's two axes and away from the lamp; for SHADOW_PARALLEL up towards the sun
     vec3 normal;    // likewise
@@ -43,7 +40,8 @@ ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
     m = axis == 0 ? m.yzx : axis == 1 ? m.zxy : m;
     bool negative = q.z < 0.0;
     int face = 2 * axis + int(negative);
-    return ShadowPoint(negative ? q * flip : q, negative ? m * flip : m, vec2(float(face % 3), float(face / 3)));
+    vec2 tile = vec2(float(face % SHADOW_CUBE_COLUMNS), float(face / SHADOW_CUBE_COLUMNS));
+    return ShadowPoint(negative ? q * flip : q, negative ? m * flip : m, tile);
 }
 
 // Share in [0, 1] of a texel's area around p in which nothing stands before the receiver's plane.
@@ -63,7 +61,7 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     float steepness = 1.0 / max(cos_lamp * cos_lamp, 1e-4);
     float leaning = tilt * steepness;
     ShadowPoint receiver = shadow_point(lamp, p, n);
-    vec2 tiles = lamp.shadow_kind == SHADOW_CUBE ? SHADOW_CUBE_TILES : vec2(1.0);
+    vec2 tiles = lamp.shadow_kind == SHADOW_CUBE ? vec2(SHADOW_CUBE_COLUMNS, SHADOW_CUBE_ROWS) : vec2(1.0);
     vec2 map_size = vec2(textureSize(map, 0));
     vec2 resolution = map_size / tiles;
     vec2 texel = 2.0 * lamp.shadow_extent / resolution;

@@ -22,7 +22,7 @@ from .scene import DIFFUSE, PRINCIPLED, Float32, Float64
 
 ALBEDO_TABLE_SIZE = 16
 _QUADRATURE_POINTS = 40
-_MAX_F0 = 0.99
+MAX_F0 = 0.99
 """Blender's own bound, so that the index of refraction stays finite."""
 
 
@@ -35,7 +35,7 @@ def f0_from_ior(ior: npt.ArrayLike) -> Float64:
 
 def ior_from_f0(f0: npt.ArrayLike) -> Float64:
     """Index of refraction (at least 1) whose reflectance at normal incidence is `f0`."""
-    root = np.sqrt(np.clip(f0, 0.0, _MAX_F0))
+    root = np.sqrt(np.clip(f0, 0.0, MAX_F0))
     return (1.0 + root) / (1.0 - root)
 
 

@@ -24,6 +24,11 @@ import numpy as np
 from .form_factor import polygon_form_factor
 from .scene import AREA, ELLIPSE, SPOT, SUN, Float64, Light
 
+NARROW_CONE = 0.03
+"""Sine of half a cone of directions below which it is as flat as a disk."""
+LEAST_BLEND = 1e-4
+"""Of 1 - cosine of half a spot's cone: its edge is never sharper."""
+
 _ELLIPSE_CELLS = 64
 _CELL_CORNERS = 8
 # Steps of the bisection that inverts the radius of a lamp's ball: one for each bit of a float64.
@@ -197,7 +202,7 @@ def spot_attenuation(light: Light, directions: Float64) -> Float64:
     local = local / np.array([*light.spot_scale, 1.0])
     cosine = -local[:, 2] / np.linalg.norm(local, axis=1)
     cos_half = math.cos(0.5 * light.spot_angle)
-    t = np.clip((cosine - cos_half) / max((1.0 - cos_half) * light.spot_blend, 1e-4), 0.0, 1.0)
+    t = np.clip((cosine - cos_half) / max((1.0 - cos_half) * light.spot_blend, LEAST_BLEND), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
@@ -218,7 +223,7 @@ def horizon_cosine(cosine: Float64, sine: Float64) -> Float64:
     # For narrow cones the terms above cancel; the cone's base is then a flat disk.
     t = c / s
     flat = s * (t * np.arccos(-t) + np.sqrt(np.maximum(1.0 - t * t, 0.0)) * (2.0 + t * t) / 3.0) / np.pi
-    partly = np.where(s < 0.03, flat, exact)
+    partly = np.where(s < NARROW_CONE, flat, exact)
     return np.where(cosine >= sine, cosine, np.where(cosine <= -sine, 0.0, partly))
 
 

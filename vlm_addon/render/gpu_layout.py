@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.brdf import MAX_F0
+from ..core.lamps import NARROW_CONE
+
 # GLSL type: (numpy scalar, components, alignment in bytes)
 _STD430: Mapping[str, tuple[str, int, int]] = {
     "float": ("<f4", 1, 4),
@@ -205,5 +208,11 @@ CONSTANTS: dict[str, int | float] = {
     "SHADOW_CUBE": 1,
     "SHADOW_CONE": 2,
     "SHADOW_PARALLEL": 3,
+    # tiles of the map of a cube: +x -x +y / -y +z -z
+    "SHADOW_CUBE_COLUMNS": 3,
+    "SHADOW_CUBE_ROWS": 2,
+    # bounds of formulas that core states
+    "MAX_F0": MAX_F0,
+    "NARROW_CONE": NARROW_CONE,
 }
 """Numbers that Python and GLSL share; every shader sees them as `#define`s."""

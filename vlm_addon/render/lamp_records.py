@@ -7,13 +7,11 @@ import math
 
 import numpy as np
 
-from ..core.lamps import LampSample, area_of
+from ..core.lamps import LEAST_BLEND, LampSample, area_of
 from ..core.scene import AREA, POINT, SPOT, SUN, Float64, Light
 from .gpu_layout import CONSTANTS, LAMP
 
 _MAX_CORNERS = 8
-# Narrowest edge of a spot's cone that is still smooth, of 1 - cosine.
-_LEAST_BLEND = 1e-4
 
 
 def lamp_record(light: Light, sample: LampSample, origin: Float64) -> np.ndarray:
@@ -34,7 +32,7 @@ def lamp_record(light: Light, sample: LampSample, origin: Float64) -> np.ndarray
     if light.kind == SPOT:
         cos_half = math.cos(0.5 * light.spot_angle)
         record["spot_cos_half"] = cos_half
-        record["spot_sharpness"] = 1.0 / max((1.0 - cos_half) * light.spot_blend, _LEAST_BLEND)
+        record["spot_sharpness"] = 1.0 / max((1.0 - cos_half) * light.spot_blend, LEAST_BLEND)
         record["spot_scale"] = light.spot_scale
     if light.kind == SUN:
         record["intensity"] = power

@@ -26,7 +26,7 @@ WIDEST_CONE = math.radians(120.0)
 # Faces of a cube: index of the axis that looks forward, its sign. The other two axes follow cyclically.
 CUBE_FACES = ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0))
 FRONT_FACE = 5
-CUBE_TILES = (3, 2)
+CUBE_TILES = (int(CONSTANTS["SHADOW_CUBE_COLUMNS"]), int(CONSTANTS["SHADOW_CUBE_ROWS"]))
 # A map of one tile has this many times the cube's texels per side: about as many in all.
 SINGLE_TILE_FACTOR = 2
 # Maps of soft lamps are this much coarser: many of them are averaged, and drawn for every picture.
