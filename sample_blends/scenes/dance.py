@@ -18,8 +18,8 @@ from .skinned import Skeleton, other_side
 PIVOT = "foot.L"
 """The bone whose tail stays where it is."""
 
-TOE_HEIGHT = 0.016
-"""How far the pivot is above the ground, m: half the thickness of the toes."""
+TOE_HEIGHT = 0.0025
+"""How far the pivot is above the ground, m: the tip of the shoe, which stands on its lower rim."""
 
 
 @dataclass(frozen=True)
