@@ -287,12 +287,14 @@ def drawn_curtain(width: float, height: float, gathered: float, folds: int, cell
     tie = 0.62
     above = np.clip(v / tie, 0, 1)
     below = np.clip((v - tie) / (1 - tie), 0, 1)
-    span = width - (width - gathered) * above**1.7 * (1 - 0.22 * np.sqrt(below) * (v > tie))
-    droop = 0.10 * height * u * np.sin(math.pi * above) * (v < tie)
-    amplitude = 0.030 + 0.055 * (1 - span / width) + 0.02 * below
+    # Below the tie the cloth opens again, with the same width and slope where the two meet.
+    span = width - (width - gathered) * (above**1.7 - 0.3 * below**2)
+    droop = 0.10 * height * u * np.sin(math.pi * above)
+    # Folds stay wider than the cloth is thick, or its two sides would pass through each other.
+    amplitude = 0.035 + 0.02 * (1 - span / width) + 0.015 * below
     wave = np.sin(2 * math.pi * folds * u + 0.6 * np.sin(5 * v + 3 * u))
     x, y, z = u * span, amplitude * wave, -v * height - droop
-    return thick_sheet(np.stack(np.broadcast_arrays(x, y, z), axis=-1), 0.02)
+    return thick_sheet(np.stack(np.broadcast_arrays(x, y, z), axis=-1), 0.012)
 
 
 def swag(width: float, drop: float, cells: tuple[int, int]) -> Shape:
@@ -302,7 +304,7 @@ def swag(width: float, drop: float, cells: tuple[int, int]) -> Shape:
     v = np.linspace(0, 1, rows + 1)[:, None]
     bow = 4 * u * (1 - u)
     z = -(0.12 + 0.88 * bow) * drop * v - 0.04 * drop * bow
-    y = 0.05 * np.sqrt(bow) * np.sin(2 * math.pi * 3.5 * v) * (0.3 + 0.7 * v) + 0.06 * bow
+    y = 0.05 * bow * np.sin(2 * math.pi * 3.5 * v) * (0.3 + 0.7 * v) + 0.06 * bow
     return thick_sheet(np.stack(np.broadcast_arrays(u * width, y, z), axis=-1), 0.02)
 
 

@@ -41,7 +41,7 @@ UPPER_ARCH = parts.Arch(1.55, UPPER_SPRINGING, UPPER_RISE)
 COLUMN_RADIUS, UPPER_COLUMN_RADIUS = 0.33, 0.25
 BALUSTERS_PER_BAY = 9
 CURTAIN_LEVELS = 1
-SMOOTH_BELOW = math.radians(35)
+SMOOTH_BELOW, HEM_ABOVE = math.radians(35), math.radians(75)
 
 CURTAIN_BAYS = (1, 3, 5, 6)
 SWAG_BAYS = (0, 2, 4, 7)
@@ -242,15 +242,24 @@ def add_ends(hall: Hall) -> None:
         hall.opposite(added)
 
 
+def keep_hem(cloth: Any) -> None:
+    """Makes the mesh sharp at its hems alone and keeps those square when it is subdivided; folds become smooth."""
+    cloth.set_sharp_from_angle(angle=HEM_ABOVE)
+    hems = np.zeros(len(cloth.edges), bool)
+    cloth.attributes["sharp_edge"].data.foreach_get("value", hems)
+    cloth.attributes.new("crease_edge", "FLOAT", "EDGE").data.foreach_set("value", hems.astype(np.float32))
+
+
 def add_cloths(hall: Hall) -> None:
     """Curtains on rods between the lower columns, bows of cloth under the upper arches."""
     hang, width = SPRINGING - 0.45, BAY - 2 * COLUMN_RADIUS
-    curtain = parts.drawn_curtain(width - 0.1, hang - 0.15, 0.75, 7, (36, 8))
+    curtain = parts.drawn_curtain(width - 0.1, hang - 0.15, 0.95, 5, (36, 8))
     bar = None
     cloths = itertools.cycle(hall.cloths)
     for index in CURTAIN_BAYS:
         at = (-HALF_LENGTH + index * BAY + COLUMN_RADIUS, COLUMN_LINE, hang)
         first = hall.add("Curtain", curtain, next(cloths), np.add(at, (0.05, 0, 0)))
+        keep_hem(first.data)
         subdivision = first.modifiers.new("Subdivision", "SUBSURF")
         subdivision.levels, subdivision.render_levels = 0, CURTAIN_LEVELS
         second = hall.opposite(first)
@@ -261,7 +270,9 @@ def add_cloths(hall: Hall) -> None:
     bow = parts.swag(2 * UPPER_ARCH.half_width, 1.1, (26, 10))
     for index in SWAG_BAYS:
         at = (-HALF_LENGTH + (index + 0.5) * BAY - UPPER_ARCH.half_width, COLUMN_LINE, UPPER_SPRINGING - 0.15)
-        hall.opposite(hall.add("Swag", bow, next(cloths), at))
+        hanging = hall.add("Swag", bow, next(cloths), at)
+        keep_hem(hanging.data)
+        hall.opposite(hanging)
 
 
 VASE = ((0.16, 0.0), (0.17, 0.05), (0.09, 0.10), (0.10, 0.16), (0.24, 0.34), (0.33, 0.56), (0.33, 0.70), (0.25, 0.84),
