@@ -20,8 +20,8 @@ from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.terminal import table
 
 SIZE_PX = 64
-SAMPLES = 64
-REFERENCE_SAMPLES = 4096
+SAMPLES = 16
+REFERENCE_SAMPLES = 2048
 LIGHT_COUNTS = (50, 200, 2000)
 # Share of the way from the room's middle to its highest corner, per axis, where the lamp hangs.
 LAMP_PLACES = {"centre": (0.0, 0.0, 0.0), "near the ceiling": (0.0, 0.0, 0.85), "near a corner": (0.8, 0.8, 0.8)}
