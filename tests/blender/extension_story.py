@@ -160,6 +160,34 @@ def main():
         }
 
     @step
+    def passes():
+        settings = bpy.context.scene.render.image_settings
+        if hasattr(settings, "media_type"):
+            settings.media_type = "MULTI_LAYER_IMAGE"
+        settings.file_format = "OPEN_EXR_MULTILAYER"
+        bpy.context.scene.render.filepath = str(FOLDER / "layers.exr")
+        bpy.ops.render.render(write_still=True)
+        if hasattr(settings, "media_type"):
+            settings.media_type = "IMAGE"
+        header = (FOLDER / "layers.exr").read_bytes()[:4000]
+        return [name for name in ("Combined", "Direct Light", "Indirect Light") if f"{name}.".encode() in header]
+
+    @step
+    def cancelled():
+        (engine,) = (each for each in bpy.types.RenderEngine.__subclasses__() if each.__name__ == "VLM_RenderEngine")
+        before = children()
+        kept = engine._is_cancelled
+        engine._is_cancelled = lambda self: True
+        stopped = picture("cancelled", "VLM_ENGINE")
+        engine._is_cancelled = kept
+        again = picture("after_cancelled", "VLM_ENGINE")
+        return {
+            "cancelled": float(stopped[..., :3].mean()),
+            "again": float(again[..., :3].mean()),
+            "same process": before == children() != [],
+        }
+
+    @step
     def border():
         scene = bpy.context.scene
         whole = picture("whole", "VLM_ENGINE")

@@ -95,8 +95,8 @@ def _counted_twice(scene: Any, made: Made) -> list[Finding]:
     for other in light_mesh_objects(scene):
         shared = sorted(set(made.sources) & set(str(other.get(SOURCES_PROPERTY, "")).split("\n")))
         if shared and other.name != made.name:
-            problem = f"{shared[0]!r} and {len(shared) - 1} more" if len(shared) > 1 else repr(shared[0])
-            problem += f" already bounce light in {other.name!r}, so it counts twice"
+            which = f"{shared[0]!r} and {len(shared) - 1} more have" if len(shared) > 1 else f"{shared[0]!r} has"
+            problem = f"{which} bounce light in {other.name!r} already, so it counts twice"
             findings.append(Finding(f"light mesh {made.name!r}", problem, "delete one of the two light meshes"))
     return findings
 

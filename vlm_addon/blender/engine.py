@@ -41,19 +41,22 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
             self.register_pass(scene, renderlayer, name, 3, "RGB", "COLOR")
 
     def render(self, depsgraph: Any) -> None:
-        """One picture for F12, an animation's frame or `blender -b`."""
-        if self.is_preview:
-            return
+        """One picture for F12, an animation's frame or `blender -b`; black where it fails or is cancelled."""
+        for title in EXTRA_PASSES.values():
+            self.add_pass(title, 3, "RGB", layer=depsgraph.view_layer.name)
+        left, bottom, right, top = _render_region(depsgraph.scene)
+        result = self.begin_result(0, 0, right - left, top - bottom, layer=depsgraph.view_layer.name)
         try:
             problem = rendering_problem()
             if problem:
                 raise VlmError(problem)
-            self._write(depsgraph, self._frame(depsgraph))
+            _fill(result.layers[0].passes, self._frame(depsgraph), slice(bottom, top), slice(left, right))
         except Cancelled:
             return
         except VlmError as error:
             self.report({"ERROR"}, str(error))
-            self.error_set(str(error))
+        finally:
+            self.end_result(result)  # also after an exception: Blender crashes when it saves a picture without result
 
     def _frame(self, depsgraph: Any) -> Frame:
         scene = depsgraph.scene
@@ -70,26 +73,18 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
             self.report({"WARNING"}, "Film > Transparent is not supported: the world is shown and alpha is 1")
         width, height = _picture_size(scene)
         settings = RenderSettings(width=width, height=height, technique=technique, samples=scene.vlm.samples)
-        return KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
+        frame = KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
+        if self._is_cancelled():  # too late for the renderer to notice
+            raise Cancelled("render")
+        return frame
 
     def _progress(self, fraction: float, label: str) -> bool:
         self.update_progress(fraction)
         self.update_stats("", label)
-        return not self.test_break()
+        return not self._is_cancelled()
 
-    def _write(self, depsgraph: Any, frame: Frame) -> None:
-        left, bottom, right, top = _render_region(depsgraph.scene)
-        result = self.begin_result(0, 0, right - left, top - bottom, layer=depsgraph.view_layer.name)
-        to_working = rec709_to_working()
-        sources = {"Combined": "combined", **{title: name for name, title in EXTRA_PASSES.items()}}
-        for title, name in sources.items():
-            target = result.layers[0].passes.get(title)
-            if target is None:
-                continue
-            pixels = frame.images[name][::-1][bottom:top, left:right].copy()
-            pixels[..., :3] = convert(pixels[..., :3], to_working)
-            target.rect.foreach_set(pixels.ravel())
-        self.end_result(result)
+    def _is_cancelled(self) -> bool:
+        return bool(self.test_break())
 
     def view_update(self, context: Any, depsgraph: Any) -> None:
         """Nothing to prepare: the rendered viewport shows a message."""
@@ -104,6 +99,16 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
         blf.size(font, MESSAGE_SIZE * scale)
         blf.color(font, 1.0, 1.0, 1.0, 1.0)
         blf.draw(font, VIEW_MESSAGE)
+
+
+def _fill(passes: Any, frame: Frame, rows: slice, columns: slice) -> None:
+    """Copy the pictures of `frame` into Blender's passes. rows, columns: the part asked for, rows from the bottom."""
+    to_working = rec709_to_working()
+    sources = {"Combined": "combined", **{title: name for name, title in EXTRA_PASSES.items()}}
+    for title, name in sources.items():
+        pixels = frame.images[name][::-1][rows, columns].copy()
+        pixels[..., :3] = convert(pixels[..., :3], to_working)
+        passes[title].rect.foreach_set(pixels.ravel())
 
 
 def _picture_size(scene: Any) -> tuple[int, int]:

@@ -36,10 +36,13 @@ class VLM_PT_create(_SidebarPanel, bpy.types.Panel):  # noqa: N801 (Blender's na
         column.scale_y = 1.5
         button = column.operator("vlm.light_scene", icon="LIGHT_SUN")
         button.target_triangles = scene.vlm.target_triangles
-        _hint(layout, context, availability.light_scene_problem(context))
+        problem = availability.light_scene_problem(context)
+        _hint(layout, context, problem)
         layout.prop(scene.vlm, "target_triangles")
         button = layout.operator("vlm.create_from_selection", icon="MESH_ICOSPHERE")
         button.target_triangles = scene.vlm.target_triangles
+        if problem is None:
+            _hint(layout, context, availability.selection_problem(context))
 
 
 class VLM_PT_check(_SidebarPanel, bpy.types.Panel):  # noqa: N801
