@@ -10,6 +10,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from .core.errors import VlmError
 
@@ -31,15 +32,29 @@ def main(argv: Sequence[str]) -> int:
     try:
         return int(arguments.run(arguments))
     except VlmError as error:
-        print(f"error: {error}", file=sys.stderr)
+        _complain(str(error))
         return error.exit_code
     except KeyboardInterrupt:
-        print("error: interrupted; nothing was written", file=sys.stderr)
+        _complain("interrupted")
         return EXIT_FAILED
 
 
+def _complain(problem: str) -> None:
+    """One line on standard error, in place of a progress bar."""
+    start = "\r\033[K" if sys.stderr.isatty() else ""
+    print(f"{start}error: {problem}", file=sys.stderr)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line instead of repeating the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        _complain(f"{message}; see {self.prog} --help")
+        sys.exit(EXIT_BAD_INPUT)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="vlm",
         description="Virtual Light Meshes: bake, render and check scenes without a window.",
         epilog=EXAMPLES,
@@ -53,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _add_bake(commands: argparse._SubParsersAction[_Parser]) -> None:
     text = "create the light mesh where the scene has none (or anew with --triangles), check it, write it"
     command = _command(commands, "bake", text, "vlm bake hall.blend --triangles 2000 --save hall_vlm.blend")
     _scene_options(command)
@@ -63,7 +78,7 @@ def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     command.set_defaults(run=_bake)
 
 
-def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     text = "one picture by one technique"
     command = _command(
         commands, "render", text, "vlm render hall_vlm.blend --technique vlm --out hall.exr --samples 64"
@@ -82,7 +97,7 @@ def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     command.set_defaults(run=_render)
 
 
-def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _add_check(commands: argparse._SubParsersAction[_Parser]) -> None:
     text = "what is wrong with the scene's light mesh; exit code 3 if anything is"
     command = _command(commands, "check", text, "vlm check hall_vlm.blend --json findings.json")
     _scene_options(command)
@@ -90,14 +105,14 @@ def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     command.set_defaults(run=_check)
 
 
-def _add_techniques(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _add_techniques(commands: argparse._SubParsersAction[_Parser]) -> None:
     command = _command(commands, "techniques", "techniques with their settings and defaults", "vlm techniques")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="the same, machine-readable")
     command.set_defaults(run=_techniques)
 
 
 def _command(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, text: str, example: str
+    commands: argparse._SubParsersAction[_Parser], name: str, text: str, example: str
 ) -> argparse.ArgumentParser:
     return commands.add_parser(name, help=text, description=text, epilog=f"example: {example}")
 

@@ -76,6 +76,33 @@ def test_a_light_mesh_drawn_by_hand_is_kept(tmp_path, capsys):
     assert "drawn by hand" in written["findings"][0]
 
 
+def test_baking_again_keeps_the_strength_that_an_artist_gave(lit_room, tmp_path, capsys):
+    first, second = tmp_path / "first.blend", tmp_path / "second.blend"
+    run(capsys, "bake", lit_room, "--triangles", 12, "--save", first)
+    open_scene(first)
+    bpy.data.objects["VLM"]["vlm_strength"] = 3.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(first))
+    run(capsys, "bake", first, "--triangles", 4, "--save", second)
+    open_scene(second)
+    assert bpy.data.objects["VLM"]["vlm_strength"] == 3.0
+
+
+def test_a_light_mesh_hidden_from_the_view_layer_is_never_replaced(lit_room, tmp_path, capsys):
+    open_scene(lit_room)
+    hidden = bpy.data.objects.new("by hand", bpy.data.meshes.new("by hand"))
+    hidden["vlm_schema"] = 1
+    folder = bpy.data.collections.new("off")
+    bpy.context.scene.collection.children.link(folder)
+    folder.objects.link(hidden)
+    bpy.context.view_layer.layer_collection.children["off"].exclude = True
+    scene = tmp_path / "hidden.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene))
+    code, errors = run(capsys, "bake", scene, "--triangles", 12, "--save", tmp_path / "o.blend")
+    assert code == 2
+    assert "'by hand'" in errors[0]
+    assert not (tmp_path / "o.blend").exists()
+
+
 def test_render_writes_a_lit_picture_and_its_times(lit_room, tmp_path, capsys):
     image, report = tmp_path / "picture.exr", tmp_path / "report.json"
     code, _ = run(
@@ -113,6 +140,13 @@ BAD_OPTIONS = {
     "negative triangles": (["bake", "{scene}", "--triangles", "-5", "--save", "{folder}/o.blend"], "at least 1"),
     "nothing to write": (["bake", "{scene}"], "name --save"),
     "no folder": (["bake", "{scene}", "--save", "{folder}/no/o.blend"], "its folder does not exist"),
+    "check onto the source": (["check", "{scene}", "--json", "{scene}"], "the source is never changed"),
+    "one name for two": (
+        ["bake", "{scene}", "--save", "{folder}/o.blend", "--json", "{folder}/o.blend"], "two outputs"),
+    "endless name": (["bake", "{scene}", "--save", "{folder}/" + 300 * "x" + ".blend"], "give a shorter one"),
+    "buffers nowhere": (
+        ["render", "{scene}", "--technique", "direct", "--out", "{folder}/o.png", "--buffers", "{folder}/a/b"],
+        "it cannot be made"),
     "onto the source": (["bake", "{scene}", "--save", "{scene}"], "the source is never changed"),
     "unknown technique": (["render", "{scene}", "--technique", "x", "--out", "{folder}/o.png"], "use one of: direct"),
     "unknown format": (["render", "{scene}", "--technique", "direct", "--out", "{folder}/o.gif"], ".exr or .png"),
@@ -205,8 +239,10 @@ def test_the_module_runs_as_a_program(tmp_path):
     )
     assert done.returncode == 0
     assert "vlm: " in done.stdout
-    usage = subprocess.run([sys.executable, "-m", "vlm_addon", "paint"], cwd=ROOT, capture_output=True, check=False)
-    assert usage.returncode == 2
+    usage = subprocess.run(
+        [sys.executable, "-m", "vlm_addon", "paint"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (usage.returncode, len(usage.stderr.strip().splitlines())) == (2, 1)
 
 
 def test_the_view_transform_changes_the_png_only(lit_room, tmp_path, capsys):

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,12 @@ from ..core.scene import Finding
 from ..core.settings import describe, from_mapping
 from ..core.simplify import SimplifySettings
 from ..core.validate import check_light_mesh
-from ..render.frame_types import Frame, RenderSettings
+from ..render.frame_types import Frame, RenderSettings, require_in_range
 from ..render.technique import technique_by_name, technique_list
 from ..terminal import TerminalProgress, table
 from .authoring import NAME
 from .availability import light_mesh_objects
-from .extract import ExtractOptions, require_camera, require_lights
+from .extract import ExtractOptions, require_camera, require_lights, require_surfaces
 from .image_io import require_format, require_view, write_image
 from .light_mesh_io import Extraction, extract
 from .names import SOURCES_PROPERTY
@@ -42,16 +42,18 @@ def bake_command(arguments: Namespace) -> None:
     settings = _simplify_settings(arguments.triangles)
     _require_apart(arguments.scene, outputs)
     opened, found = _open(arguments)
-    kept = _kept_light_meshes()
-    anew = found.light_mesh is None or (settings is not None and not kept)
+    drawn = _drawn_by_hand()
+    anew = not drawn and (found.light_mesh is None or settings is not None)
+    _require_visible_light_meshes(found)
     made = bake(found.snapshot, None if anew else found.light_mesh, settings if anew else None, TerminalProgress())
     if anew:
-        for replaced in light_mesh_objects(bpy.context.scene):
-            bpy.data.objects.remove(replaced)
+        for other in light_mesh_objects(bpy.context.scene):
+            if other.name != NAME:
+                bpy.data.objects.remove(other)
         write_light_mesh(made.light_mesh, NAME, [mesh.name for mesh in found.snapshot.meshes])
     findings = made.findings
-    if settings is not None and kept:
-        problem = f"the scene has light meshes drawn by hand ({', '.join(kept)}), so --triangles made no other"
+    if settings is not None and drawn:
+        problem = f"the scene has light meshes drawn by hand ({', '.join(drawn)}), so --triangles made no other"
         findings = (
             Finding(f"scene {found.snapshot.name!r}", problem, "delete them from the scene to have one made"),
             *findings,
@@ -71,7 +73,17 @@ def _simplify_settings(triangles: int | None) -> SimplifySettings | None:
     return from_mapping(SimplifySettings, {"target_triangles": triangles}, "bake")
 
 
-def _kept_light_meshes() -> list[str]:
+def _require_visible_light_meshes(found: Extraction) -> None:
+    """Raises InvalidInput where light meshes are hidden from the view layer: a bake would not see what it replaces."""
+    hidden = light_mesh_objects(bpy.context.scene) if found.light_mesh is None else []
+    if hidden:
+        problem = "it has lights but is excluded from or hidden in this view layer"
+        raise InvalidInput(
+            f"light mesh {hidden[0].name!r}", problem, "show it, choose another --view-layer or delete it"
+        )
+
+
+def _drawn_by_hand() -> list[str]:
     """Names of the scene's light meshes that were not made by simplification."""
     return [thing.name for thing in light_mesh_objects(bpy.context.scene) if SOURCES_PROPERTY not in thing]
 
@@ -92,12 +104,7 @@ def render_command(arguments: Namespace) -> None:
     from_mapping(technique.settings, settings, f"technique {technique.name!r}")
     require_format(arguments.out)
     _require_apart(arguments.scene, [path for path in (arguments.out, arguments.json) if path is not None])
-    opened, found = _open(arguments)
-    require_camera(found.snapshot)
-    require_lights(found.snapshot)
-    if arguments.view is not None:
-        require_view(arguments.view)
-    width, height = arguments.size or _scene_size()
+    width, height = arguments.size or (1, 1)
     frame_settings = RenderSettings(
         width,
         height,
@@ -107,10 +114,23 @@ def render_command(arguments: Namespace) -> None:
         shadow_samples=arguments.shadow_samples,
         buffers=arguments.buffers is not None,
     )
-    frame = _rendered(found, frame_settings, TerminalProgress())
-    write_image(arguments.out, frame.images["combined"], view=arguments.view)
+    require_in_range(frame_settings)
     if arguments.buffers is not None:
-        _write_buffers(arguments.buffers, frame)
+        _make_folder(arguments.buffers)
+    opened, found = _open(arguments)
+    require_camera(found.snapshot)
+    require_surfaces(found.snapshot)
+    require_lights(found.snapshot)
+    if arguments.view is not None:
+        require_view(arguments.view)
+    if arguments.size is None:
+        width, height = _scene_size()
+        frame_settings = replace(frame_settings, width=width, height=height)
+    frame = _rendered(found, frame_settings, TerminalProgress())
+    if arguments.buffers is not None:
+        for name, image in frame.images.items():
+            write_image(arguments.buffers / f"{name}.exr", image)
+    write_image(arguments.out, frame.images["combined"], view=arguments.view)
     _print_findings((*frame.findings, *found.snapshot.findings))
     print(_timing_table(frame))
     write_json(arguments.json, _scene_report(opened) | _frame_report(frame, frame_settings, found.snapshot.findings))
@@ -121,7 +141,7 @@ def _setting_texts(pairs: Sequence[str]) -> dict[str, str]:
     for pair in pairs:
         name, equals, value = pair.partition("=")
         if not (name and equals):
-            raise InvalidInput(f"--set {pair!r}", "it is not KEY=VALUE", "write it as in --set samples=64")
+            raise InvalidInput(f"--set {pair!r}", "it is not KEY=VALUE", "write it as in --set NAME=1")
         texts[name] = value
     return texts
 
@@ -139,13 +159,11 @@ def _rendered(found: Extraction, settings: RenderSettings, progress: Progress) -
         KEPT.close()
 
 
-def _write_buffers(folder: Path, frame: Frame) -> None:
+def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise InvalidInput(str(folder), f"it cannot be made ({error.strerror})", "give another folder") from error
-    for name, image in frame.images.items():
-        write_image(folder / f"{name}.exr", image)
 
 
 def _timing_table(frame: Frame) -> str:
@@ -170,6 +188,7 @@ def check_command(arguments: Namespace) -> int:
 
     What extraction approximates is printed and reported as notes, which do not count.
     """
+    _require_apart(arguments.scene, [arguments.json] if arguments.json is not None else [])
     opened, found = _open(arguments)
     light_mesh = found.light_mesh if found.light_mesh is not None else empty_light_mesh()
     findings = check_light_mesh(light_mesh, found.snapshot.meshes)
@@ -217,9 +236,11 @@ def _open(arguments: Namespace) -> tuple[OpenedScene, Extraction]:
 
 
 def _require_apart(scene: Path, outputs: Sequence[Path]) -> None:
-    """Raises InvalidInput where an output cannot be written or would replace the scene it is made from."""
+    """Raises InvalidInput where an output cannot be written, is the scene it is made from or another output."""
     for path in outputs:
         require_writable(path)
+        if sum(path.resolve() == other.resolve() for other in outputs) > 1:
+            raise InvalidInput(str(path), "two outputs have this name", "give each output its own path")
         if path.exists() and scene.exists() and path.samefile(scene):
             raise InvalidInput(str(path), "it is the scene itself", "give another path; the source is never changed")
 

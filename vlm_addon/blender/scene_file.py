@@ -173,9 +173,13 @@ def require_writable(path: Path | str) -> Path:
     """`path` as a Path. Raises InvalidInput where no file can be written there, before any work is done."""
     path = Path(path)
     subject = str(path)
-    if path.is_dir():
+    try:
+        is_folder, has_folder = path.is_dir(), path.absolute().parent.is_dir()
+    except (OSError, ValueError) as error:
+        raise InvalidInput(subject[:80], f"no file can have this name ({error})"[:120], "give a shorter one") from error
+    if is_folder:
         raise InvalidInput(subject, "it is a folder", "give the name of a file")
-    if not path.absolute().parent.is_dir():
+    if not has_folder:
         raise InvalidInput(subject, "its folder does not exist", "make the folder or give another path")
     with atomic_output(path, keep=False):
         pass

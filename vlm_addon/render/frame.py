@@ -12,7 +12,7 @@ from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.progress import Progress, step
 from ..core.scene import Camera, Finding, Float32, SceneSnapshot
 from ..core.settings import from_mapping
-from .frame_types import Frame, RenderSettings
+from .frame_types import Frame, RenderSettings, require_in_range
 from .geometry import GpuGeometry
 from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
 from .passes.direct_light import DirectLightPass
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 NO_SURFACE = -1
 # Share of a frame's progress that comes before its first sample.
 PREPARED = 0.1
-MAX_SIZE, MAX_SAMPLES, MAX_SHADOW_RESOLUTION, MAX_SHADOW_SAMPLES = 16384, 4096, 8192, 1024
 
 
 def render_frame(
@@ -93,17 +92,7 @@ def _require_renderable(
     snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings
 ) -> Camera:
     """The camera. Raises InvalidInput."""
-    limits = {
-        "width": MAX_SIZE,
-        "height": MAX_SIZE,
-        "samples": MAX_SAMPLES,
-        "shadow_resolution": MAX_SHADOW_RESOLUTION,
-        "shadow_samples": MAX_SHADOW_SAMPLES,
-    }
-    for name, limit in limits.items():
-        value = getattr(settings, name)
-        if not 1 <= value <= limit:
-            raise InvalidInput(f"render setting {name!r}", f"{value} is out of range", f"give 1 to {limit}")
+    require_in_range(settings)
     if snapshot.camera is None:
         raise InvalidInput(f"scene {snapshot.name!r}", "it has no camera", "add one and make it the active camera")
     if light_mesh is not None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..core.errors import InvalidInput
 from ..core.scene import Finding, Float32
 
 
@@ -27,6 +28,18 @@ class RenderSettings:
     shadow_resolution: int = 1024
     shadow_samples: int = 32
     buffers: bool = False
+
+
+LIMITS = {"width": 16384, "height": 16384, "samples": 4096, "shadow_resolution": 8192, "shadow_samples": 1024}
+"""The largest value of each number in RenderSettings; the smallest is 1."""
+
+
+def require_in_range(settings: RenderSettings) -> None:
+    """Raises InvalidInput for a number that is out of range."""
+    for name, limit in LIMITS.items():
+        value = getattr(settings, name)
+        if not 1 <= value <= limit:
+            raise InvalidInput(f"render setting {name!r}", f"{value} is out of range", f"give 1 to {limit}")
 
 
 @dataclass(frozen=True)
