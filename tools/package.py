@@ -95,7 +95,7 @@ def fetch_wheels(wheels: Iterable[Wheel]) -> None:
     missing = [wheel for wheel in wheels if not (folder / wheel.name).exists()]
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda wheel: _download(wheel, folder), missing))
-    checksums = dict(reversed(line.split()) for line in CHECKSUMS.read_text().splitlines())
+    checksums = {name: checksum for checksum, name in map(str.split, CHECKSUMS.read_text().splitlines())}
     for wheel in wheels:
         path = folder / wheel.name
         if not path.exists():
