@@ -157,7 +157,7 @@ def _open_context() -> moderngl.Context:
             context = moderngl.create_standalone_context(require=REQUIRED_VERSION, **settings)
         # glcontext and moderngl raise plain Exception, ValueError or OSError, by platform and by backend
         except Exception as error:  # noqa: BLE001
-            failures.append(f"{backend or 'default'}: {str(error).strip().splitlines()[0]}")
+            failures.append(f"{backend or 'default'}: {str(error).strip().partition(chr(10))[0]}")
             continue
         return context
     raise DeviceError(f"no OpenGL 4.3 device; tried {'; '.join(failures)}; {INSTALL_HINT}")
