@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .double_double import Array, DoubleDouble, difference
-from .edge_sum import clipped_chain, clipped_edge_sum, edge_sum_vector
+from .edge_sum import along, clipped_chain, clipped_edge_sum, edge_sum_vector
 from .errors import InvalidInput
 from .scene import Float64
 
@@ -30,7 +30,7 @@ _DOUBTFUL_HEIGHT = 1e5
 def polygon_form_factor(points: npt.ArrayLike, normals: npt.ArrayLike, polygons: npt.ArrayLike) -> Float64:
     """Share of the hemisphere over each point that each polygon fills, cosine-weighted, clipped at the horizon.
 
-    points, normals: (p, 3), metres and unit length. polygons: (q, k, 3), convex, plane, 3 to 8 vertices,
+    points, normals: (p, 3), metres and directions. polygons: (q, k, 3), convex, plane, 3 to 8 vertices,
     counter-clockwise as seen from the emitting side; repeated vertices are allowed. Returns (p, q) float64 in [0, 1]:
     irradiance over radiosity. Exactly 0 behind the polygon, in its plane and where it is wholly under the horizon.
     Raises InvalidInput for NaN, infinity, what is not a number, and other shapes.
@@ -64,15 +64,15 @@ def paired_vector_form_factor(points: npt.ArrayLike, polygons: npt.ArrayLike) ->
     length bounds the form factor for such normals. It points towards the polygon and is 0 behind it and in its plane.
     Raises as `polygon_form_factor`.
     """
-    points, _, polygons = _validated(points, np.zeros(np.shape(points)), polygons, np.float64)
+    points, _, polygons = _validated(points, np.ones(np.shape(points)), polygons, np.float64)
     _require_pairs(points, polygons)
     points, polygons = _scaled(points, polygons)
     faces = _faces_point(points, polygons)
     result = np.zeros_like(points)
     near, far = _by_distance(points, polygons, faces)
     for chosen, order in far:
-        chain = polygons[chosen] - points[chosen, None]
-        result[chosen] = _integrated_vector(chain, _area_vectors(polygons[chosen]), order)
+        chain = polygons[chosen] - polygons[chosen, :1]
+        result[chosen] = _integrated_vector(points[chosen], polygons[chosen], chain, order)
     result[near] = edge_sum_vector(points[near], polygons[near])
     return result
 
@@ -87,8 +87,8 @@ def _paired(points: Array, normals: Array, polygons: Array) -> Array:
     near, far = _by_distance(points, polygons, candidates)
     for chosen, order in far:
         chain = clipped_chain(points[chosen], normals[chosen], polygons[chosen])
-        vector = _integrated_vector(chain, _area_vectors(polygons[chosen]), order)
-        result[chosen] = (vector * normals[chosen]).sum(-1)
+        vector = _integrated_vector(points[chosen], polygons[chosen], chain, order)
+        result[chosen] = along(vector, normals[chosen])
     result[near] = clipped_edge_sum(points[near], normals[near], polygons[near])
     return np.clip(result, 0.0, 1.0)
 
@@ -103,6 +103,8 @@ def _validated(
     if points.ndim != 2 or points.shape[-1] != 3 or points.shape != normals.shape:
         problem = f"shapes {points.shape} and {normals.shape}"
         raise InvalidInput("form factor points and normals", problem, "give (p, 3) for both")
+    if not normals.any(-1).all():
+        raise InvalidInput("form factor normals", "one has no length", "give unit normals")
     if polygons.ndim != 3 or polygons.shape[2] != 3 or not MIN_VERTICES <= polygons.shape[1] <= MAX_VERTICES:
         remedy = f"give (q, k, 3) with k from {MIN_VERTICES} to {MAX_VERTICES}"
         raise InvalidInput("form factor polygons", f"shape {polygons.shape}", remedy)
@@ -185,14 +187,15 @@ def _by_distance(points: Array, polygons: Array, candidates: Array) -> tuple[Arr
     return np.flatnonzero(remaining), far
 
 
-def _integrated_vector(chain: Array, area_vectors: Array, order: int) -> Array:
+def _integrated_vector(points: Array, polygons: Array, chain: Array, order: int) -> Array:
     """(m, 3) vector form factors by Gauss quadrature over a fan of triangles: towards dA, cos' / (pi d^2) dA.
 
-    chain: (m, c, 3), outline seen from the point.
+    chain: (m, c, 3), the outline to integrate over, from the polygon's first vertex.
     """
     nodes, node_weights = np.polynomial.legendre.leggauss(order)
     dtype = chain.dtype.type
     nodes, node_weights = dtype(0.5) * (nodes.astype(dtype) + 1), dtype(0.5) * node_weights.astype(dtype)
+    area_vectors, first = _area_vectors(polygons), polygons[:, 0] - points
     areas = np.sqrt((area_vectors * area_vectors).sum(-1))
     unit = area_vectors / np.where(areas > 0.0, areas, 1.0)[:, None]
     total = np.zeros_like(chain[:, 0])
@@ -201,9 +204,9 @@ def _integrated_vector(chain: Array, area_vectors: Array, order: int) -> Array:
         double_area = (np.cross(side, far_side) * unit).sum(-1)
         for u, u_weight in zip(nodes, node_weights, strict=True):
             for v, v_weight in zip(nodes, node_weights, strict=True):
-                position = chain[:, 0] + u * (side + v * far_side)
+                position = first + chain[:, 0] + u * (side + v * far_side)
                 squared = (position * position).sum(-1)
                 total += (u_weight * v_weight * u * double_area / (squared * squared))[:, None] * position
     # One plane distance for all points of the polygon: its own vertices agree on it only up to rounding.
-    plane_distance = np.abs((chain[:, 0] * unit).sum(-1))
+    plane_distance = np.abs((first * unit).sum(-1))
     return np.asarray(total * plane_distance[:, None] / np.pi)
