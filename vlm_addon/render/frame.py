@@ -14,12 +14,13 @@ from ..core.scene import Camera, Finding, Float32, SceneSnapshot
 from ..core.settings import from_mapping
 from .frame_types import Frame, RenderSettings, require_in_range
 from .geometry import GpuGeometry
+from .local_space import LocalSpace, make_local_space
 from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
 from .passes.shadow_map import LampShadows
 from .technique import FrameInputs, SceneInputs, technique_by_name
-from .view import make_view
+from .view import make_view, require_usable
 
 if TYPE_CHECKING:
     from .device import Device
@@ -41,15 +42,19 @@ def render_frame(
     chosen: object = from_mapping(
         technique_type.settings, settings.technique_settings, f"technique {settings.technique!r}"
     )
-    camera = _require_renderable(snapshot, light_mesh, settings)
+    _require_renderable(snapshot, light_mesh, settings)
     context, shaders, timer = device.context, device.shaders, device.timer()
     width, height = settings.width, settings.height
+    # From here on nothing is in world space but what is read back.
+    space = make_local_space(snapshot)
+    local, camera = _localised(space, snapshot)
+    local_lights = None if light_mesh is None else space.light_mesh(light_mesh)
     step(progress, 0.0, "geometry")
     with timer.measure("geometry"):
-        geometry = GpuGeometry(context, snapshot)
-    shadows = LampShadows(context, shaders, geometry, snapshot.lights, settings.shadow_resolution)
+        geometry = GpuGeometry(context, local, np.zeros(3))
+    shadows = LampShadows(context, shaders, geometry, local.lights, settings.shadow_resolution)
     scene = SceneInputs(
-        context, shaders, timer, snapshot, geometry, shadows, light_mesh, settings, _within(progress, 0.0, PREPARED)
+        context, shaders, timer, local, geometry, shadows, local_lights, settings, _within(progress, 0.0, PREPARED)
     )
     technique = technique_type(scene, chosen)
     direct_light = DirectLightPass(context, shaders, width, height)
@@ -75,7 +80,7 @@ def render_frame(
     images, findings = _finished_images(sums)
     if settings.buffers:
         images["coverage"] = np.ascontiguousarray(sums["direct"][..., 3:])
-        images |= _surface_images(gbuffer_pass, geometry, camera, settings)
+        images |= _surface_images(gbuffer_pass, geometry, camera, settings, space)
     else:
         del images["irradiance"]
     counters = {
@@ -88,16 +93,21 @@ def render_frame(
     return Frame(images, timer.timings(), counters, device.name, timer.kind, tuple(findings))
 
 
-def _require_renderable(
-    snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings
-) -> Camera:
-    """The camera. Raises InvalidInput."""
+def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings) -> None:
+    """Raises InvalidInput."""
     require_in_range(settings)
     if snapshot.camera is None:
         raise InvalidInput(f"scene {snapshot.name!r}", "it has no camera", "add one and make it the active camera")
+    require_usable(snapshot.camera)
     if light_mesh is not None:
         require_valid(light_mesh)
-    return snapshot.camera
+
+
+def _localised(space: LocalSpace, snapshot: SceneSnapshot) -> tuple[SceneSnapshot, Camera]:
+    """The scene and its camera in local space."""
+    local = space.scene(snapshot)
+    assert local.camera is not None
+    return local, local.camera
 
 
 def _within(progress: Progress, start: float, share: float) -> Progress:
@@ -120,7 +130,7 @@ def _finished_images(sums: dict[str, Float32]) -> tuple[dict[str, Float32], list
 
 
 def _surface_images(
-    gbuffer_pass: GBufferPass, geometry: GpuGeometry, camera: Camera, settings: RenderSettings
+    gbuffer_pass: GBufferPass, geometry: GpuGeometry, camera: Camera, settings: RenderSettings, space: LocalSpace
 ) -> dict[str, Float32]:
     """What shows at the pixels' centres: world positions in m, normals, base colour, depth in m, ids."""
     gbuffer = gbuffer_pass.render(geometry, make_view(camera, settings.width, settings.height, geometry.origin), 0)
@@ -129,10 +139,10 @@ def _surface_images(
     )
     shown = np.any(normal[..., :3] != 0.0, axis=2, keepdims=True)
     images = {
-        "position": np.where(shown, position[..., :3] + geometry.origin, 0.0),
+        "position": np.where(shown, space.world_points(position[..., :3]), 0.0),
         "normal": normal[..., :3],
         "albedo": base_color[..., :3],
-        "depth": position[..., 3:],
+        "depth": position[..., 3:] * space.unit,
     }
     for channel, name in enumerate(("material_id", "tag_id", "face_id")):
         images[name] = np.where(shown, ids[..., channel : channel + 1], NO_SURFACE)

@@ -40,23 +40,25 @@ class _Batch:
 class GpuGeometry:
     """All visible triangles in float32 relative to `origin`, opaque ones first.
 
-    Vertex attributes: `in_position` (m, from the origin), `in_normal`, `in_uv`, `in_color` and `in_tangent` (xyz and
+    Vertex attributes: `in_position` (from the origin), `in_normal`, `in_uv`, `in_color` and `in_tangent` (xyz and
     the bitangent's sign) where some material reads them. What is constant over a triangle is in the storage buffer
     TRIANGLE_BINDING at gl_VertexID / 3, the materials are in MATERIAL_BINDING.
 
-    origin: (3,) float64, centre of the visible bounds, m in world space. low, high: (3,) float64, bounds from the
-    origin.
+    origin: (3,) float64, in the snapshot's own space. low, high: (3,) float64, visible bounds from the origin.
     """
 
-    def __init__(self, context: moderngl.Context, snapshot: SceneSnapshot) -> None:
-        """Raises InvalidInput for vertices that are not finite or a material index without material."""
+    def __init__(self, context: moderngl.Context, snapshot: SceneSnapshot, origin: Float64 | None = None) -> None:
+        """origin: the centre of the visible bounds by default.
+
+        Raises InvalidInput for vertices that are not finite or a material index without material.
+        """
         self._context = context
         self._materials = snapshot.materials or (Material("default"),)
         meshes = [mesh for mesh in snapshot.meshes if len(mesh.triangles)]
         for mesh in meshes:
             _require_usable(mesh, len(self._materials))
         low, high = snapshot.bounds()
-        self.origin: Float64 = 0.5 * (low + high)
+        self.origin: Float64 = 0.5 * (low + high) if origin is None else origin
         self.low: Float64 = low - self.origin
         self.high: Float64 = high - self.origin
         self.triangle_count = sum(len(mesh.triangles) for mesh in meshes)

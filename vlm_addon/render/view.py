@@ -32,7 +32,7 @@ def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: 
 
     origin: (3,) float64, world space. Raises InvalidInput where the camera has no finite frame.
     """
-    _require_usable(camera)
+    require_usable(camera)
     left, right, bottom, top = camera.frame(width, height)
     shift_x = jitter[0] * (right - left) / width
     shift_y = jitter[1] * (top - bottom) / height
@@ -70,7 +70,8 @@ def _projection(frame: tuple[float, float, float, float], near: float, far: floa
     )
 
 
-def _require_usable(camera: Camera) -> None:
+def require_usable(camera: Camera) -> None:
+    """Raises InvalidInput where the camera, in metres, has no finite frame."""
     subject = f"camera {camera.name!r}"
     if not np.isfinite(camera.matrix_world).all() or abs(np.linalg.det(camera.matrix_world[:3, :3])) < 0.5:
         raise InvalidInput(subject, "its matrix is not a rotation and a position", "apply or clear its scale")

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The space that the renderer works in: near the camera's part of the scene, and as large as every other scene.
+
+float32 holds seven digits of a coordinate. They are spent where the camera is, on lengths that do not depend on how
+large the scene is or where in the world it lies, so a scene that is moved or scaled gives the same picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.light_mesh import VirtualLightMesh
+from ..core.scene import SUN, Camera, Float32, Float64, Light, SceneSnapshot
+
+HALF_DIAGONAL = 1024.0
+"""Of every scene's visible bounds, in local units: fourth powers of a scene's length and of a millionth of it are
+both far from the ends of float32."""
+GRAIN = 0.25
+"""The origin moves in steps of this many local units, so that a small move of the camera rounds nothing anew."""
+
+
+@dataclass(frozen=True)
+class LocalSpace:
+    """origin: (3,) float64, m in world space. unit: m per local unit of length.
+
+    Radiance, irradiance and everything without length are the same in both spaces.
+    """
+
+    origin: Float64
+    unit: float
+
+    def scene(self, snapshot: SceneSnapshot) -> SceneSnapshot:
+        """`snapshot` with everything that has a place or a length in local units."""
+        meshes = tuple(replace(mesh, positions=self._points(mesh.positions)) for mesh in snapshot.meshes)
+        lights = tuple(self._light(light) for light in snapshot.lights)
+        camera = self._camera(snapshot.camera) if snapshot.camera is not None else None
+        return replace(snapshot, meshes=meshes, lights=lights, camera=camera)
+
+    def light_mesh(self, light_mesh: VirtualLightMesh) -> VirtualLightMesh:
+        """`light_mesh` in local units."""
+        samples = replace(light_mesh.samples, positions=self._points(light_mesh.samples.positions))
+        return replace(light_mesh, vertices=self._points(light_mesh.vertices), samples=samples)
+
+    def world_points(self, points: Float32) -> Float64:
+        """(..., 3) float64 m in world space of local `points`."""
+        return points * self.unit + self.origin
+
+    def _points(self, points: Float64) -> Float64:
+        return (points - self.origin) / self.unit
+
+    def _light(self, light: Light) -> Light:
+        x, y, z = self._points(np.array(light.position, np.float64)).tolist()
+        red, green, blue = light.power
+        # Irradiance falls with the square of a distance; a sun's is given.
+        share = 1.0 if light.kind == SUN else self.unit**-2
+        return replace(
+            light,
+            position=(x, y, z),
+            power=(red * share, green * share, blue * share),
+            radius=light.radius / self.unit,
+            size_x=light.size_x / self.unit,
+            size_y=light.size_y / self.unit,
+        )
+
+    def _camera(self, camera: Camera) -> Camera:
+        matrix = camera.matrix_world.copy()
+        matrix[:3, 3] = self._points(matrix[:3, 3])
+        return replace(
+            camera,
+            matrix_world=matrix,
+            ortho_scale=camera.ortho_scale / self.unit,
+            clip_start=camera.clip_start / self.unit,
+            clip_end=camera.clip_end / self.unit,
+        )
+
+
+def make_local_space(snapshot: SceneSnapshot) -> LocalSpace:
+    """The local space of a scene and its camera.
+
+    Its origin is the place in the visible bounds that is nearest to the camera, but for rounding; without a finite
+    camera or extent it falls back to the middle and to metres.
+    """
+    low, high = snapshot.bounds()
+    half_diagonal = 0.5 * float(np.linalg.norm(high - low))
+    usable = np.isfinite(half_diagonal) and half_diagonal > 0.0
+    unit = half_diagonal / HALF_DIAGONAL if usable else 1.0
+    middle = 0.5 * (low + high)
+    eye = middle if snapshot.camera is None else snapshot.camera.matrix_world[:3, 3]
+    if not (usable and np.isfinite(eye).all()):
+        return LocalSpace(np.where(np.isfinite(middle), middle, 0.0), unit)
+    steps = np.round((np.clip(eye, low, high) - middle) / (GRAIN * unit))
+    return LocalSpace(middle + steps * (GRAIN * unit), unit)
