@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What breaks renderers, in stations around the origin: millimetre props on a kilometre of floor, walls that touch and
 walls in one plane, slivers, one-sheet cloth, thin curved shells, mirrored and squashed objects. Ten cameras look on.
+Every station has virtual lights.
 
 Object positions are multiples of 2^-10 m, so that the whole scene can be moved by 8,192 m without rounding.
 """
@@ -14,6 +15,20 @@ from typing import Any
 import numpy as np
 
 from . import blend
+from .blend import LightPatch
+from .hard_case_lights import (
+    BOWL_TAG,
+    CLOTH_TAG,
+    FLOOR_INNERMOST,
+    HALF_PIPE_TAG,
+    add_lights,
+    ball_lights,
+    both_sides,
+    corner_lights,
+    nested_squares,
+    whole,
+    without_bottom,
+)
 from .shapes import Shape, box, flipped, icosphere, join, lathe, moved, octahedron, patch, shape
 
 FLOOR_EXTENT = 1024.0
@@ -23,6 +38,9 @@ WALL_HEIGHT, WALL_THICKNESS = 2.5, 0.25
 # Stations' centres on the floor.
 PROPS, WALLS, SLIVERS, CLOTH, SHELLS, FRAMES = (0, 0), (-5, 3), (4, 3), (0, 6), (5, 7), (-4.5, 9)
 FAR_TOWER = (160, 400)
+
+GREY, PALE, RED, BLUE = (0.42, 0.42, 0.40), (0.68, 0.66, 0.60), (0.56, 0.10, 0.07), (0.09, 0.20, 0.50)
+GREEN, GLAZED = (0.12, 0.42, 0.14), (0.60, 0.42, 0.12)
 
 SUN_IRRADIANCE, POINT_W, SPOT_W, PROP_LAMP_W, AREA_W = 1.2, 120.0, 400.0, 0.004, 30.0
 
@@ -59,13 +77,19 @@ def millimetre_props() -> dict[str, Shape]:
         "Hovering slab": moved(box((0, 0, 0), (0.012, 0.003, 0.0004)), (-0.004, -0.011, 0.0001)),
         "Ball 6 mm": moved(icosphere(0.003, 3), (0.004, 0.002, 0.003)),
         "Ball 1 mm": moved(icosphere(0.0005, 2), (0.0075, -0.003, 0.0005)),
-        "Spike": lathe([(0.0, 0.0), (0.0004, 0.0), (0.0, 0.012)], 12),
+        "Spike": spike(12),
     }
 
 
-def saucer() -> Shape:
+def spike(segments: int) -> Shape:
+    """A cone of twelve millimetres, less than one across."""
+    return lathe([(0.0, 0.0), (0.0004, 0.0), (0.0, 0.012)], segments)
+
+
+def saucer(segments: int = 48) -> Shape:
     """A flat dish under the props, its rim a fifth of a millimetre thick."""
-    return lathe([(0.0, -0.0005), (0.012, -0.0005), (0.018, 0.0012), (0.0178, 0.0014), (0.0118, 0.0), (0.0, 0.0)], 48)
+    profile = [(0.0, -0.0005), (0.012, -0.0005), (0.018, 0.0012), (0.0178, 0.0014), (0.0118, 0.0), (0.0, 0.0)]
+    return lathe(profile, segments)
 
 
 def touching_walls() -> dict[str, Shape]:
@@ -121,6 +145,15 @@ def degenerate_sheet() -> Shape:
     return shape(points, [(0, 1, 7), (0, 7, 4), (5, 2, 3), (5, 3, 7), (0, 1, 2), (1, 5, 6), (3, 7, 4)])
 
 
+def sliver_station(needles: int = 512) -> dict[str, Shape]:
+    """A disc of needles, a sheet cut into slivers and a sheet with triangles without area."""
+    return {
+        "Needle disc": moved(needle_disc(0.6, needles), (-1.1, 0, 0.75)),
+        "Sliver strip": moved(sliver_strip(1.0, 1.2), (0.2, 0, 0)),
+        "Degenerate sheet": moved(degenerate_sheet(), (0.9, 0, 0)),
+    }
+
+
 def cloth(width: float, height: float, columns: int = 48, rows: int = 24) -> Shape:
     """One hanging sheet without thickness, to be seen and lit from both sides."""
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
@@ -163,23 +196,69 @@ def add_station(scene: Any, parts: dict[str, Shape], centre: Sequence[float], ma
         blend.add_mesh(scene, name, part, material).location = snapped((*centre, 0.0)[:3])
 
 
+CORNER_ARMS = (((0, 0, 0), (0.8, 0.25, 0.25)), ((0, 0.25, 0), (0.25, 0.6, 0.25)), ((0, 0, 0.25), (0.25, 0.25, 1.1)))
+CORNER_PLACES = (((1, 1, 1), 0.0), ((-1, 1, 1), 0.0), ((1, -1, 1), 0.6), ((2.0, 0.5, 0.001), 0.0))
+"""Scale and turn of each."""
+
+
 def add_frames(scene: Any, material: Any) -> None:
-    """One shape as it is, mirrored, mirrored and turned, squashed flat, and sheared by its parent's scale."""
+    """One shape as it is, mirrored, mirrored and turned, squashed flat, and sheared by its parent's scale.
+
+    Each has light mesh objects in the same place, turned and scaled as it is.
+    """
     x, y = FRAMES
-    corner = join(
-        [box((0, 0, 0), (0.8, 0.25, 0.25)), box((0, 0.25, 0), (0.25, 0.6, 0.25)), box((0, 0, 0.25), (0.25, 0.25, 1.1))]
-    )
+    corner = join([box(lower, upper) for lower, upper in CORNER_ARMS])
     data = blend.mesh_data("Corner", corner, [material])
-    for index, (scale, turn) in enumerate(
-        (((1, 1, 1), 0.0), ((-1, 1, 1), 0.0), ((1, -1, 1), 0.6), ((2.0, 0.5, 0.001), 0.0))
-    ):
-        added = blend.add_object(scene, f"Corner {index}", data)
-        added.location, added.scale = snapped((x + 1.6 * index - 2.4, y, 0.0)), scale
-        added.rotation_euler = (0, 0, turn)
+    lights = [LightPatch(corner_lights(CORNER_ARMS), PALE)]
     parent = blend.add_object(scene, "Squash", None)
     parent.location, parent.scale = snapped((x, y + 1.5, 0.0)), (1.5, 0.5, 1.0)
+    for index, (scale, turn) in enumerate(CORNER_PLACES):
+        location = snapped((x + 1.6 * index - 2.4, y, 0.0))
+        added = blend.add_object(scene, f"Corner {index}", data)
+        for thing in (added, add_lights(scene, added.name, location, lights)):
+            thing.location, thing.scale, thing.rotation_euler = location, scale, (0, 0, turn)
     child = blend.add_object(scene, "Sheared corner", data)
-    child.parent, child.rotation_euler = parent, (0, 0, 0.7)
+    for thing in (child, add_lights(scene, child.name, (0, 0, 0), lights)):
+        thing.parent, thing.rotation_euler = parent, (0, 0, 0.7)
+
+
+def add_virtual_lights(scene: Any) -> None:
+    """Lights of everything but the frames, coarser than the surfaces where those are curved."""
+    add_lights(scene, "Floor", (0, 0, 0), [LightPatch(nested_squares(FLOOR_INNERMOST, FLOOR_EXTENT / 2), GREY)])
+    tower = without_bottom(box((-4, -4, 0), (4, 4, 60)))
+    add_lights(scene, "Tower", (*FAR_TOWER, 0), [LightPatch(tower, RED)])
+
+    props = millimetre_props()
+    patches = [whole(saucer(8), saucer(), PALE)]
+    for name, color in (("Cube 1 mm", RED), ("Cube 4 mm", BLUE), ("Hovering slab", GREEN)):
+        patches.append(LightPatch(without_bottom(props[name]), color))
+    patches.append(whole(ball_lights((0.004, 0.002, 0.003), 0.003), props["Ball 6 mm"], GLAZED))
+    patches.append(whole(ball_lights((0.0075, -0.003, 0.0005), 0.0005), props["Ball 1 mm"], PALE))
+    patches.append(whole(spike(4), props["Spike"], RED))
+    add_lights(scene, "Props", snapped((*PROPS, GRAIN)), patches)
+
+    walls = {name: without_bottom(wall) for name, wall in touching_walls().items()}
+    panel = walls.pop("Panel in the wall's plane")
+    patches = [*(LightPatch(wall, PALE) for wall in walls.values()), LightPatch(panel, BLUE)]
+    add_lights(scene, "Walls", snapped((*WALLS, 0)), patches)
+
+    slivers = sliver_station(needles=24)
+    add_lights(scene, "Slivers", snapped((*SLIVERS, 0)), [LightPatch(part, GREEN) for part in slivers.values()])
+
+    sheet = cloth(2.0, 1.9, 12, 3)
+    patches = [whole(side, cloth(2.0, 1.9), RED, CLOTH_TAG) for side in (sheet, flipped(sheet))]
+    add_lights(scene, "Cloth", snapped((*CLOTH, 0.125)), patches)
+    facing_away = flipped(cloth(0.8, 1.2, 6, 2))
+    facing_away_lights = [LightPatch(both_sides(facing_away), BLUE, CLOTH_TAG)]
+    add_lights(scene, "Cloth facing away", snapped((1.75, 6.5, 0.125)), facing_away_lights)
+
+    pipe, inner_pipe = half_pipe(0.7, 0.002, 1.6, 8), half_pipe(0.694, 0.002, 1.6, 8)
+    patches = [whole(pipe, half_pipe(0.7, 0.002, 1.6), GLAZED, HALF_PIPE_TAG)]
+    patches.append(whole(inner_pipe, half_pipe(0.694, 0.002, 1.6), GLAZED, HALF_PIPE_TAG))
+    coarse_bowl = moved(bowl(0.45, 0.003, 8, 3), (1.3, -0.4, 0))
+    patches.append(whole(coarse_bowl, bowl(0.45, 0.003), GLAZED, BOWL_TAG))
+    patches.append(LightPatch(moved(octahedron(0.2), (1.3, -0.4, 0.6)), GLAZED))
+    add_lights(scene, "Shells", snapped((*SHELLS, 0)), patches)
 
 
 def add_lamps(scene: Any) -> None:
@@ -210,10 +289,9 @@ def add_cameras(scene: Any) -> None:
 def build() -> None:
     """Fills the current file with the scene."""
     scene = blend.empty_scene("hard_cases", 640, 480)
-    grey, pale = blend.diffuse("Grey floor", (0.42, 0.42, 0.40)), blend.diffuse("Pale", (0.68, 0.66, 0.60))
-    red, blue = blend.diffuse("Red", (0.56, 0.10, 0.07)), blend.diffuse("Blue", (0.09, 0.20, 0.50))
-    green = blend.diffuse("Green", (0.12, 0.42, 0.14))
-    glossy = blend.principled("Glazed", (0.60, 0.42, 0.12))
+    grey, pale = blend.diffuse("Grey floor", GREY), blend.diffuse("Pale", PALE)
+    red, blue, green = blend.diffuse("Red", RED), blend.diffuse("Blue", BLUE), blend.diffuse("Green", GREEN)
+    glossy = blend.principled("Glazed", GLAZED)
 
     half = FLOOR_EXTENT / 2
     blend.add_mesh(scene, "Kilometre floor", patch((-half, -half, 0), (FLOOR_EXTENT, 0, 0), (0, FLOOR_EXTENT, 0)), grey)
@@ -230,16 +308,13 @@ def build() -> None:
     add_station(scene, walls, WALLS, pale)
     add_station(scene, {"Panel in the wall's plane": panel}, WALLS, blue)
 
-    x, y = SLIVERS
-    slivers = {
-        "Needle disc": moved(needle_disc(0.6, 512), (-1.1, 0, 0.75)),
-        "Sliver strip": moved(sliver_strip(1.0, 1.2), (0.2, 0, 0)),
-        "Degenerate sheet": moved(degenerate_sheet(), (0.9, 0, 0)),
-    }
-    add_station(scene, slivers, (x, y), green)
+    add_station(scene, sliver_station(), SLIVERS, green)
 
-    blend.add_mesh(scene, "Cloth", cloth(2.0, 1.9), red).location = snapped((*CLOTH, 0.125))
-    blend.add_mesh(scene, "Cloth facing away", flipped(cloth(0.8, 1.2)), blue).location = snapped((1.75, 6.5, 0.125))
+    sheets = (("Cloth", cloth(2.0, 1.9), red, (*CLOTH, 0.125)),)
+    sheets += (("Cloth facing away", flipped(cloth(0.8, 1.2)), blue, (1.75, 6.5, 0.125)),)
+    for name, sheet, material, place in sheets:
+        added = blend.add_mesh(scene, name, sheet, material)
+        added.location, added["vlm_tag"] = snapped(place), CLOTH_TAG
 
     shells = {
         "Half pipe": half_pipe(0.7, 0.002, 1.6),
@@ -248,7 +323,10 @@ def build() -> None:
         "Floating gem": moved(octahedron(0.2), (1.3, -0.4, 0.6)),
     }
     add_station(scene, shells, SHELLS, glossy)
+    for name, tag in (("Half pipe", HALF_PIPE_TAG), ("Half pipe in half pipe", HALF_PIPE_TAG), ("Bowl", BOWL_TAG)):
+        scene.objects[name]["vlm_tag"] = tag
     add_frames(scene, pale)
+    add_virtual_lights(scene)
 
     add_lamps(scene)
     add_cameras(scene)
