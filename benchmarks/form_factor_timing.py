@@ -10,17 +10,17 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from benchmarks.form_factor_forms import FORMS, Form, stored_with
+from benchmarks.form_factor_forms import FORMS, RATIONAL_FIT, Form, stored_with
 from vlm_addon.core.scene import Float64
 from vlm_addon.render.device import Device
 from vlm_addon.render.gpu_layout import VIRTUAL_LIGHT
 
 TILE_POINTS = 64
-TILES = 96
+TILES = 32
 # Each invocation reads a light once for so many points, or reading would cost more than the forms do.
 HELD_POINTS = 4
 GROUP_SIZE = 64
-ROUNDS = 11
+ROUNDS = 41
 EMPTY_LOOP = "empty loop"
 ROOM_M = np.array([6.0, 4.0, 3.0])
 # (boxes around all points, times that each of their twelve triangles is split in four), then small lamps. Together
@@ -79,11 +79,19 @@ class Workload:
 
 @dataclass(frozen=True)
 class Cost:
-    """Nanoseconds per point and light: median and quartiles over the rounds."""
+    """Nanoseconds per point and light.
+
+    median, low, high: median and quartiles over the rounds, the loop included. net: median without what the empty loop
+    of the same round took; ratio: of that to the reference form's, both of the same round, with its quartiles.
+    """
 
     median: float
     low: float
     high: float
+    net: float
+    ratio: float
+    ratio_low: float
+    ratio_high: float
 
 
 def room(random: np.random.Generator, tiles: int = TILES) -> Workload:
@@ -94,7 +102,8 @@ def room(random: np.random.Generator, tiles: int = TILES) -> Workload:
     offsets -= normals * (offsets * normals).sum(axis=1, keepdims=True)
     points = np.repeat(centres, TILE_POINTS, axis=0) + offsets
     boxes = [_split(_box(random.uniform(0.1, 2.0), ROOM_M), times) for count, times in BOXES for _ in range(count)]
-    size = np.exp(random.uniform(*np.log(LAMP_SIZES_M), (LAMPS, 1, 1)))
+    smallest, largest = np.log(LAMP_SIZES_M)
+    size = np.exp(random.uniform(smallest, largest, (LAMPS, 1, 1)))
     lamps = random.uniform(0.0, 1.0, (LAMPS, 1, 3)) * ROOM_M + size * _unit(random.normal(size=(LAMPS, 3, 3)))
     lights = random.permutation(np.concatenate([*boxes, lamps]))
     heights = np.einsum("pc,qkc->pqk", normals, lights) - (normals * points).sum(axis=1)[:, None, None]
@@ -114,16 +123,14 @@ def shuffled(workload: Workload, random: np.random.Generator) -> Workload:
 def measure(device: Device, workload: Workload, forms: Sequence[Form] = FORMS, rounds: int = ROUNDS) -> dict[str, Cost]:
     """Cost of each form by name, and of EMPTY_LOOP; the forms take turns, so that a busy machine burdens all alike.
 
-    On a software renderer processor time of all threads, elsewhere wall clock.
+    On a software renderer processor time of all threads, elsewhere wall clock. Ratios are to RATIONAL_FIT.
     """
     clock = time.process_time if device.is_software else time.perf_counter
+    includes = {form.name: (f'#include "{form.path}"', _CALL.format(form.function)) for form in forms}
     seconds: dict[str, list[float]] = {}
     with device.current() as context:
         buffers = _upload(context, workload)
-        shaders = {EMPTY_LOOP: _shader(device, "", _EMPTY_CALL)}
-        shaders |= {
-            form.name: _shader(device, f'#include "{form.path}"', _CALL.format(form.function)) for form in forms
-        }
+        shaders = {name: _shader(device, *text) for name, text in {EMPTY_LOOP: ("", _EMPTY_CALL), **includes}.items()}
         for _ in range(rounds + 1):
             for name, shader in shaders.items():
                 shader["light_count"] = len(workload.lights)
@@ -135,12 +142,16 @@ def measure(device: Device, workload: Workload, forms: Sequence[Form] = FORMS, r
         del buffers
     pairs = len(workload.points) * len(workload.lights)
     # The first round compiles.
-    return {name: _cost(np.array(values[1:]) / pairs) for name, values in seconds.items()}
+    nanoseconds = {name: 1e9 * np.array(values[1:]) / pairs for name, values in seconds.items()}
+    empty, reference = nanoseconds[EMPTY_LOOP], nanoseconds[RATIONAL_FIT]
+    return {name: _cost(values, empty, reference) for name, values in nanoseconds.items()}
 
 
-def _cost(seconds: Float64) -> Cost:
-    low, median, high = 1e9 * np.quantile(seconds, (0.25, 0.5, 0.75))
-    return Cost(float(median), float(low), float(high))
+def _cost(nanoseconds: Float64, empty: Float64, reference: Float64) -> Cost:
+    low, median, high = (float(value) for value in np.quantile(nanoseconds, (0.25, 0.5, 0.75)))
+    ratios = (nanoseconds - empty) / (reference - empty)
+    ratio_low, ratio, ratio_high = (float(value) for value in np.quantile(ratios, (0.25, 0.5, 0.75)))
+    return Cost(median, low, high, float(np.median(nanoseconds - empty)), ratio, ratio_low, ratio_high)
 
 
 def _shader(device: Device, include: str, call: str) -> moderngl.ComputeShader:

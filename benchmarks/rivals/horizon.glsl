@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Clips a triangle at the horizon, for rivals whose formula holds for light wholly above it. The same work as in
-// lib/form_factor.glsl, so that a comparison of times is one of the integrals.
+// lib/form_factor.glsl, without its care for corners that almost touch the point.
 #ifndef RIVALS_HORIZON
 #define RIVALS_HORIZON
 
 #define RIVALS_PI 3.14159265358979
 
 // Corners of what is above the horizon, in m from the point, in the triangle's order; repeated where it has fewer.
-struct VisibleOutline {
+struct RivalOutline {
     vec3 q0, q1, q2, q3;
 };
 
 // Whether anything sends light to p with unit normal n. v0, v1, v2: m. area_vector: m², along the emitting side.
-bool visible_outline(vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, out VisibleOutline outline) {
+bool rival_outline(vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, out RivalOutline outline) {
     vec3 a = v0 - p, b = v1 - p, c = v2 - p;
     vec3 heights = vec3(dot(n, a), dot(n, b), dot(n, c));
     if (dot(area_vector, a) >= 0.0 || max(max(heights.x, heights.y), heights.z) <= 0.0) {

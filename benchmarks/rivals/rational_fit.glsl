@@ -9,8 +9,8 @@
 float rational_fit_form_factor(
     vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, float bounding_radius
 ) {
-    VisibleOutline outline;
-    if (!visible_outline(p, n, v0, v1, v2, area_vector, outline)) {
+    RivalOutline outline;
+    if (!rival_outline(p, n, v0, v1, v2, area_vector, outline)) {
         return 0.0;
     }
     vec3 a = normalize(outline.q0), b = normalize(outline.q1), c = normalize(outline.q2), d = normalize(outline.q3);
