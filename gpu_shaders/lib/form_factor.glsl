@@ -2,16 +2,16 @@
 // Irradiance from a triangle of constant radiosity; float32 form of vlm_addon/core/form_factor.py.
 //
 // Positions in metres from a local origin near the scene. The printed formula (seed 002, eq. 3.1) divides by lengths
-// that vanish at contact and cancels far away; here nothing is normalised, edges are weighted by half-angle
-// polynomials, and far triangles are integrated over their area.
+// that vanish at contact and cancels far away; here edges are weighted by half-angle polynomials, nothing is divided by
+// what may vanish, and far triangles are integrated over their area. Everything is done in units of about the light's
+// size, so that no product leaves float32's range at any scale.
 #ifndef LIB_FORM_FACTOR
 #define LIB_FORM_FACTOR
 
 #define FORM_FACTOR_PI 3.14159265358979
-// From this many bounding radii on the three-point area integral is good to 2e-7 absolute, 1e-3 / (d/R)^3 relative.
+// Bounding radii from which on a triangle is integrated over its area: 1e-7 absolute, and relative to a triangle that
+// faces the point squarely 1e-3 / distance³ or 3e-7, whichever is more. The edges, which cancel, lose as much there.
 #define FORM_FACTOR_FAR 16.0
-// Sine of the angle under which an edge passes the point below which its plane is noise.
-#define FORM_FACTOR_ON_EDGE 1e-6
 
 // 2 atan(sqrt u) / sqrt u for u in [0, 1], relative error 1e-7.
 float double_arctangent_ratio(float u) {
@@ -25,43 +25,101 @@ float double_arctangent_ratio(float u) {
     return 2.0 * (sum * u + 0.9999999);
 }
 
+// Direction of a x b, its length the tangent of half the angle between a and b or, where cosine = a b < 0, of half
+// what is left to a half turn. From the span, which loses nothing where a and b almost agree, and the shorter of them,
+// which loses nothing where one almost touches the point.
+vec3 half_angle_normal(vec3 a, vec3 b, float a_length, float b_length, float cosine) {
+    return cross(a_length < b_length ? a : b, b - a) / max(a_length * b_length + abs(cosine), 1e-37);
+}
+
 // Angle at the point between a and b, times the cosine between n and the plane through both: one edge's share of
-// 2 pi E. a, b: m, from the point to the ends of an edge that runs clockwise seen from the point.
-float edge_irradiance(vec3 a, vec3 b, float a_squared, float b_squared, vec3 n) {
-    vec3 c = cross(a, b - a);
-    float cos_r = dot(a, b);
-    float r = sqrt(a_squared * b_squared);
-    float c_squared = dot(c, c);
-    float q = max(r + abs(cos_r), 1e-30);
-    float ratio = double_arctangent_ratio(min(1.0, c_squared / (q * q))) / q;
-    float least = FORM_FACTOR_ON_EDGE * r;
-    // Over an acute angle nothing is divided by the length of c; with the point on the edge its direction is noise.
-    float obtuse = c_squared > least * least ? FORM_FACTOR_PI * inversesqrt(max(c_squared, 1e-37)) - ratio : 0.0;
-    return (cos_r >= 0.0 ? ratio : obtuse) * dot(n, c);
+// 2 pi E. a, b: from the point to the ends of an edge that runs clockwise seen from the point. cosine: a b.
+// Exactly reversed by exchanging a and b, so that triangles that share an edge cancel along it however near it is.
+float edge_irradiance(vec3 a, vec3 b, float a_length, float b_length, float cosine, vec3 n) {
+    vec3 s = half_angle_normal(a, b, a_length, b_length, cosine);
+    float u = dot(s, s);
+    float acute = double_arctangent_ratio(min(u, 1.0));
+    float obtuse = FORM_FACTOR_PI * inversesqrt(max(u, 1e-37)) - acute;
+    return (cosine >= 0.0 ? acute : obtuse) * dot(n, s);
 }
 
 float edge_irradiance(vec3 a, vec3 b, vec3 n) {
-    return edge_irradiance(a, b, dot(a, a), dot(b, b), n);
+    return edge_irradiance(a, b, length(a), length(b), dot(a, b), n);
 }
 
 // Angle between a and b in [0, pi]: the arc along the horizon. Lies on the rim of the cosine-weighted disk, so it
 // always adds.
 float horizon_arc(vec3 a, vec3 b) {
-    vec3 c = cross(a, b - a);
-    float cos_r = dot(a, b);
-    float t = length(c) / max(sqrt(dot(a, a) * dot(b, b)) + abs(cos_r), 1e-30);
-    float angle = double_arctangent_ratio(min(1.0, t * t)) * t;
-    return cos_r >= 0.0 ? angle : FORM_FACTOR_PI - angle;
+    float cosine = dot(a, b);
+    float t = min(length(half_angle_normal(a, b, length(a), length(b), cosine)), 1.0);
+    float angle = double_arctangent_ratio(t * t) * t;
+    return cosine >= 0.0 ? angle : FORM_FACTOR_PI - angle;
 }
 
-// Mean over three points of height / distance^4, in 1/m^3. a, b, c: m, from the point. heights: m, of a, b and c.
-float far_integrand(vec3 a, vec3 b, vec3 c, vec3 heights) {
-    vec3 sum = a + b + c;
-    vec3 middle_heights = 0.5 * (heights + (heights.x + heights.y + heights.z) * (1.0 / 3.0));
-    vec3 middle = sum * (1.0 / 6.0);
-    vec3 ma = middle + 0.5 * a, mb = middle + 0.5 * b, mc = middle + 0.5 * c;
-    vec3 inverse = 1.0 / vec3(dot(ma, ma), dot(mb, mb), dot(mc, mc));
-    return dot(middle_heights * inverse, inverse) * (1.0 / 3.0);
+// Where an edge with one end above the horizon meets it; anything finite for other edges. The same to the last bit
+// (unless both ends are equally far from it) whichever end is called a. Starts from the end closer to the horizon,
+// which may almost touch the point.
+vec3 edge_at_horizon(vec3 a, vec3 b, float height_a, float height_b) {
+    bool a_closer = abs(height_a) < abs(height_b);
+    float rise = height_a - height_b;
+    return (a_closer ? a : b) + (b - a) * ((a_closer ? height_a : height_b) / (rise != 0.0 ? rise : 1.0));
+}
+
+// What of a triangle is above the horizon: q0 q1 q2 q3, with an arc along the horizon from q2 to q3 where it is cut.
+// Corners repeat where it has fewer.
+struct VisibleOutline {
+    vec3 q0, q1, q2, q3;
+    vec3 heights;               // of q0, q1, q2; q3 is on the horizon or repeats q2
+    float area_012, area_023;   // of the two triangles, over the whole triangle's
+};
+
+// a, b, c: from the point to the corners, heights: of them over the horizon, one at least above 0.
+VisibleOutline visible_outline(vec3 a, vec3 b, vec3 c, vec3 heights) {
+    // The corner that is alone on its side of the horizon comes first. Software renderers run every branch, so what
+    // differs between the cases is chosen and the rest is shared.
+    bvec3 above = greaterThan(heights, vec3(0.0));
+    int count = int(above.x) + int(above.y) + int(above.z);
+    bool whole = count == 3, lone_above = count == 1;
+    bool second = !whole && above.y == lone_above && above.x != lone_above;
+    bool third = !whole && above.z == lone_above && above.x != lone_above;
+    vec3 first = second ? b : third ? c : a;
+    vec3 next = second ? c : third ? a : b;
+    vec3 last = second ? a : third ? b : c;
+    vec3 h = second ? heights.yzx : third ? heights.zxy : heights;
+    vec3 to_next = edge_at_horizon(first, next, h.x, h.y), to_last = edge_at_horizon(first, last, h.x, h.z);
+    // Shares of the edges from the first corner up to the horizon.
+    float share_next = whole ? 0.0 : h.x / (h.x - h.y), share_last = whole ? 0.0 : h.x / (h.x - h.z);
+    bool has_first = whole || lone_above;
+    VisibleOutline outline;
+    outline.q0 = has_first ? first : next;
+    outline.q1 = lone_above ? first : whole ? next : last;
+    outline.q2 = whole ? last : lone_above ? to_next : to_last;
+    outline.q3 = whole ? last : lone_above ? to_last : to_next;
+    outline.heights = whole ? h : lone_above ? vec3(h.x, h.x, 0.0) : vec3(h.y, h.z, 0.0);
+    outline.area_012 = lone_above ? 0.0 : 1.0 - share_last;
+    outline.area_023 = share_last * (lone_above ? share_next : 1.0 - share_next);
+    return outline;
+}
+
+// Mean over a triangle of height / distance^4, from the midpoints of its edges: exact for quadratic functions.
+// heights, inverse: of the midpoints, times 2 and 1 / (4 distance²).
+float midpoint_mean(vec3 heights, vec3 inverse) {
+    return dot(heights * inverse, inverse) * (8.0 / 3.0);
+}
+
+// The same over an outline, 0 below the horizon, per area of the whole triangle. squared: of q0 to q3. products: q0 q1,
+// q1 q2, q0 q2, q0 q3.
+float far_integrand(VisibleOutline outline, vec4 squared, vec4 products) {
+    vec3 h = outline.heights;
+    vec4 inverse = 1.0 / (squared.xyxx + squared.yzzw + 2.0 * products);
+    // Between q2 and q3 all heights are 0, or there is nothing.
+    return outline.area_012 * midpoint_mean(vec3(h.x + h.y, h.y + h.z, h.x + h.z), inverse.xyz)
+        + outline.area_023 * midpoint_mean(vec3(h.x + h.z, 0.0, h.x), inverse.zyw);
+}
+
+// 2^-floor(log2 x): scales without rounding.
+float inverse_power_of_two(float x) {
+    return uintBitsToFloat((254u << 23) - (floatBitsToUint(x) & 0x7f800000u));
 }
 
 // Share of the hemisphere over p with normal n that a triangle fills, cosine-weighted, clipped at the horizon; in
@@ -71,44 +129,26 @@ float far_integrand(vec3 a, vec3 b, vec3 c, vec3 heights) {
 float triangle_form_factor(
     vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, float bounding_radius
 ) {
-    vec3 a = v0 - p, b = v1 - p, c = v2 - p;
-    float plane_distance_area = -dot(area_vector, a);
+    float scale = inverse_power_of_two(bounding_radius);
+    vec3 a = (v0 - p) * scale, b = (v1 - p) * scale, c = (v2 - p) * scale;
+    float plane_distance_area = -dot(area_vector * scale * scale, a);
     vec3 heights = vec3(dot(n, a), dot(n, b), dot(n, c));
+    // Written so that NaN, of lights without size, gives 0.
     if (!(plane_distance_area > 0.0) || max(max(heights.x, heights.y), heights.z) <= 0.0) {
         return 0.0;
     }
-    // The corner that is alone on its side of the horizon comes first. Software renderers run every branch, so what
-    // differs between the cases is chosen and the rest is shared.
-    bvec3 above = greaterThan(heights, vec3(0.0));
-    int count = int(above.x) + int(above.y) + int(above.z);
-    bool whole = count == 3, lone_above = count == 1;
-    bool second = !whole && above.y == lone_above && above.x != lone_above;
-    bool third = !whole && above.z == lone_above && above.x != lone_above;
-    mat3 corners = mat3(a, b, c);
-    a = second ? corners[1] : third ? corners[2] : corners[0];
-    b = second ? corners[2] : third ? corners[0] : corners[1];
-    c = second ? corners[0] : third ? corners[1] : corners[2];
-    heights = second ? heights.yzx : third ? heights.zxy : heights;
-    float t_b = heights.x / (whole ? 1.0 : heights.x - heights.y);
-    float t_c = heights.x / (whole ? 1.0 : heights.x - heights.z);
-    vec3 on_ab = a + (b - a) * t_b, on_ac = a + (c - a) * t_c;
-
-    vec3 middle = (a + b + c) * (1.0 / 3.0);
-    float far = FORM_FACTOR_FAR * bounding_radius;
-    if (dot(middle, middle) > far * far) {
-        float all_of_it = far_integrand(a, b, c, heights);
-        float corner = t_b * t_c * far_integrand(a, on_ab, on_ac, vec3(heights.x, 0.0, 0.0));
-        float integrand = whole ? all_of_it : lone_above ? corner : all_of_it - corner;
-        return max(integrand * plane_distance_area * (1.0 / FORM_FACTOR_PI), 0.0);
-    }
-    // Outline q0 q1 q2 q3 with the arc along the horizon, if any, from q2 to q3; repeated corners add nothing.
-    vec3 q0 = whole || lone_above ? a : b;
-    vec3 q1 = lone_above ? a : whole ? b : c;
-    vec3 q2 = whole ? c : lone_above ? on_ab : on_ac;
-    vec3 q3 = whole ? c : lone_above ? on_ac : on_ab;
+    VisibleOutline outline = visible_outline(a, b, c, heights);
+    vec3 q0 = outline.q0, q1 = outline.q1, q2 = outline.q2, q3 = outline.q3;
     vec4 squared = vec4(dot(q0, q0), dot(q1, q1), dot(q2, q2), dot(q3, q3));
-    float sum = horizon_arc(q2, q3) + edge_irradiance(q1, q0, squared.y, squared.x, n)
-        + edge_irradiance(q2, q1, squared.z, squared.y, n) + edge_irradiance(q0, q3, squared.x, squared.w, n);
+    vec4 products = vec4(dot(q0, q1), dot(q1, q2), dot(q0, q2), dot(q0, q3));
+    float far = FORM_FACTOR_FAR * scale * bounding_radius;
+    if (squared.x > far * far) {
+        return far_integrand(outline, squared, products) * plane_distance_area * (1.0 / FORM_FACTOR_PI);
+    }
+    vec4 lengths = sqrt(squared);
+    float sum = horizon_arc(q2, q3) + edge_irradiance(q1, q0, lengths.y, lengths.x, products.x, n)
+        + edge_irradiance(q2, q1, lengths.z, lengths.y, products.y, n)
+        + edge_irradiance(q0, q3, lengths.x, lengths.w, products.w, n);
     return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);
 }
 

@@ -49,12 +49,17 @@ int light_class(PointGroup group, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, f
 float far_form_factor(vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector) {
     vec3 a = v0 - p, b = v1 - p, c = v2 - p;
     vec3 heights = vec3(dot(n, a), dot(n, b), dot(n, c));
-    return max(far_integrand(a, b, c, heights) * dot(area_vector, a) * (-1.0 / FORM_FACTOR_PI), 0.0);
+    vec3 ab = a + b, bc = b + c, ca = c + a;
+    float mean = midpoint_mean(heights + heights.yzx, 1.0 / vec3(dot(ab, ab), dot(bc, bc), dot(ca, ca)));
+    return max(mean * dot(area_vector, a) * (-1.0 / FORM_FACTOR_PI), 0.0);
 }
 
-// triangle_form_factor where all corners are above the horizon.
-float whole_form_factor(vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector) {
-    vec3 a = v0 - p, b = v1 - p, c = v2 - p;
+// triangle_form_factor where all corners are above the horizon and nearer than FORM_FACTOR_FAR radii.
+float whole_form_factor(
+    vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, float bounding_radius
+) {
+    float scale = inverse_power_of_two(bounding_radius);
+    vec3 a = (v0 - p) * scale, b = (v1 - p) * scale, c = (v2 - p) * scale;
     float sum = edge_irradiance(b, a, n) + edge_irradiance(c, b, n) + edge_irradiance(a, c, n);
     return dot(area_vector, a) < 0.0 ? clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0) : 0.0;
 }

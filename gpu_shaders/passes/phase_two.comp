@@ -155,7 +155,8 @@ void main() {
         ADD_MEMBERS(LIGHT_IS_FAR,
             far_form_factor(positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector))
         ADD_MEMBERS(LIGHT_IS_WHOLE,
-            whole_form_factor(positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector))
+            whole_form_factor(
+                positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius))
         ADD_MEMBERS(LIGHT_IS_CLIPPED,
             triangle_form_factor(
                 positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius))
