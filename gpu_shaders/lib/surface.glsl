@@ -7,18 +7,22 @@ bool has_bit(uint flags, uint bit) {
     return (flags & bit) != 0u;
 }
 
+// v as a unit vector, or `otherwise` where v has no direction: smooth normals of opposite corners cancel midway.
+vec3 unit_or(vec3 v, vec3 otherwise) {
+    float length_squared = dot(v, v);
+    return length_squared > 1e-30 ? v * inversesqrt(length_squared) : otherwise;
+}
+
 // Unit normal of a tangent-space map. normal, tangent: interpolated, unit or not; tangent.w: sign of the bitangent;
-// texel: rgb in [0, 1]; strength: 0 keeps the normal.
-vec3 mapped_normal(vec3 normal, vec4 tangent, vec3 texel, float strength) {
-    vec3 unit_normal = normalize(normal);
+// texel: rgb in [0, 1]; strength: 0 keeps the normal; otherwise: unit, where the normal has no direction.
+vec3 mapped_normal(vec3 normal, vec4 tangent, vec3 texel, float strength, vec3 otherwise) {
+    vec3 unit_normal = unit_or(normal, otherwise);
+    vec3 direction = 2.0 * texel - 1.0;
+    vec3 bitangent = sign(tangent.w) * cross(normal, tangent.xyz);
+    vec3 mapped = direction.x * tangent.xyz + direction.y * bitangent + direction.z * normal;
     if (dot(tangent.xyz, tangent.xyz) == 0.0) {
         return unit_normal;
     }
-    vec3 direction = 2.0 * texel - 1.0;
-    vec3 bitangent = sign(tangent.w) * cross(normal, tangent.xyz);
-    vec3 mapped = normalize(direction.x * tangent.xyz + direction.y * bitangent + direction.z * normal);
-    vec3 blended = unit_normal + (mapped - unit_normal) * max(strength, 0.0);
-    float blended_length = length(blended);
-    return blended_length > 0.0 ? blended / blended_length : unit_normal;
+    return unit_or(unit_normal + (unit_or(mapped, unit_normal) - unit_normal) * max(strength, 0.0), unit_normal);
 }
 #endif

@@ -47,7 +47,7 @@ void main() {
     vec3 emission = material.emission;
     float roughness = material.roughness;
     float metallic = material.metallic;
-    vec3 normal = normalize(corner_normal);
+    vec3 normal = unit_or(corner_normal, triangle_normal);
     if (has_bit(material.flags, 1u << BASE_COLOR_UNIT)) {
         base_color *= texture(base_color_map, uv).rgb;
     }
@@ -64,7 +64,8 @@ void main() {
         emission *= texture(emission_map, uv).rgb;
     }
     if (has_bit(material.flags, 1u << NORMAL_UNIT)) {
-        normal = mapped_normal(corner_normal, corner_tangent, texture(normal_map, uv).rgb, material.normal_strength);
+        vec3 texel = texture(normal_map, uv).rgb;
+        normal = mapped_normal(corner_normal, corner_tangent, texel, material.normal_strength, triangle_normal);
     }
 
     // Both normals turn to the viewer's side, as Cycles turns them on back faces.
