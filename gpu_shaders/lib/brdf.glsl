@@ -7,6 +7,8 @@
 #define INVERSE_PI 0.318309886183791
 // Roughness below which a lobe is a mirror that lamps do not show in; keeps float32 finite.
 #define LEAST_ALPHA 1e-4
+// Keeps float32 finite.
+#define LEAST_IOR 1e-5
 // Variance of half vectors over a small light, per steradian, as an addition to alpha squared.
 #define LIGHT_SPREAD 0.1
 
@@ -27,6 +29,7 @@ float f0_from_ior(float ior) {
 
 // Index of refraction of the specular layer: a level of 0.5 leaves `ior`, others scale its F0 by twice the level.
 float specular_ior(float ior, float level) {
+    ior = max(ior, LEAST_IOR);
     if (level == 0.5) {
         return ior;
     }
@@ -55,7 +58,7 @@ float fresnel_dielectric_mean(float ior) {
 
 // Factor on a single-scatter lobe that makes up for light scattered more than once (Kulla and Conty 2017).
 vec3 scattering_gain(float albedo, float mean_albedo, vec3 mean_fresnel) {
-    vec3 multiple = mean_fresnel * mean_albedo / (1.0 - mean_fresnel * (1.0 - mean_albedo));
+    vec3 multiple = mean_fresnel * mean_albedo / max(1.0 - mean_fresnel * (1.0 - mean_albedo), 1e-4);
     return 1.0 + multiple * (1.0 - albedo) / max(albedo, 1e-4);
 }
 
@@ -97,7 +100,7 @@ float ggx_lobe(float cos_half, float cos_light, float cos_view, float alpha) {
     // 1 - cos² without cancellation matters for sharp lobes; cos_half is close to 1 there.
     float sine_squared = max((1.0 - cos_half) * (1.0 + cos_half), 0.0);
     float denominator = alpha_squared + sine_squared * (1.0 - alpha_squared);
-    float distribution = alpha_squared * INVERSE_PI / (denominator * denominator);
+    float distribution = alpha_squared * INVERSE_PI / max(denominator * denominator, 1e-30);
     float view_part = cos_light * sqrt(cos_view * cos_view * (1.0 - alpha_squared) + alpha_squared);
     float light_part = cos_view * sqrt(cos_light * cos_light * (1.0 - alpha_squared) + alpha_squared);
     return distribution * cos_light * 0.5 / max(view_part + light_part, 1e-20);
@@ -109,7 +112,8 @@ vec3 specular_reflection(Reflector reflector, vec3 normal, vec3 to_light, vec3 t
     if (reflector.alpha == 0.0 || cos_light <= 0.0 || cos_view <= 0.0) {
         return vec3(0.0);
     }
-    vec3 half_vector = normalize(to_light + to_view);
+    vec3 half_vector = to_light + to_view;
+    half_vector *= inversesqrt(max(dot(half_vector, half_vector), 1e-30));
     float cos_vh = clamp(dot(to_view, half_vector), 0.0, 1.0);
     float lobe = ggx_lobe(clamp(dot(normal, half_vector), 0.0, 1.0), cos_light, cos_view, reflector.alpha);
     float grazing = 1.0 - cos_vh;

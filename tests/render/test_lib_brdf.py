@@ -102,6 +102,121 @@ def test_smooth_lobes_and_grazing_angles_stay_finite(device: Device) -> None:
     assert (values >= 0.0).all()
 
 
+def function(device: Device, expression: str, components: int = 1, **inputs: object) -> np.ndarray:
+    """A function of plain numbers, of every combination of the inputs: (combinations,) or with components."""
+    grids = np.meshgrid(*(np.asarray(values, np.float32) for values in inputs.values()), indexing="ij")
+    columns = {name: grid.ravel() for name, grid in zip(inputs, grids, strict=True)}
+    return evaluate(device, "lib/brdf.glsl", expression, columns, components).reshape(*grids[0].shape, -1)
+
+
+def of_all(*inputs: object) -> list[np.ndarray]:
+    """float64 grids of the numbers that `function` rounds to float32, with an axis for components."""
+    grids = np.meshgrid(*(np.asarray(values, np.float32).astype(float) for values in inputs), indexing="ij")
+    return [grid[..., None] for grid in grids]
+
+
+IORS = (1e-6, 0.5, 0.999, 1.0, 1.0001, 1.01, 1.33, 1.5, 2.5, 19.0, 1000.0)
+COSINES = (0.0, 1e-20, 1e-6, 1e-3, 0.1, 0.5, 0.9, 1.0)
+ALPHAS = (1e-4, 1e-2, 0.25, 1.0)
+
+
+def test_f0_against_the_oracle(device: Device) -> None:
+    found = function(device, "f0_from_ior(ior)", ior=IORS)
+    np.testing.assert_allclose(found, brdf.f0_from_ior(*of_all(IORS)), rtol=1e-5, atol=1e-12)
+
+
+def test_specular_ior_against_the_oracle(device: Device) -> None:
+    levels = (-1.0, 0.0, 0.1, 0.5, 0.9, 1.0, 1e6)
+    found = function(device, "specular_ior(ior, level)", ior=(0.0, *IORS), level=levels)
+    np.testing.assert_allclose(found, brdf.specular_ior(*of_all((0.0, *IORS), levels)), rtol=1e-4)
+
+
+def test_fresnel_against_the_oracle(device: Device) -> None:
+    found = function(device, "fresnel_dielectric(cosine, ior)", cosine=COSINES, ior=IORS)
+    cosine, ior = of_all(COSINES, IORS)
+    # At the very angle of total reflection the rounding of one side or the other decides.
+    decided = np.abs(ior * ior - 1.0 + cosine * cosine) > 1e-5
+    assert decided.mean() > 0.8
+    expected = brdf.fresnel_dielectric(cosine, ior)
+    np.testing.assert_allclose(found[decided], expected[decided], rtol=2e-4, atol=1e-6)
+    assert ((found >= 0.0) & (found <= 1.0)).all()
+
+
+def test_mean_fresnel_against_the_oracle(device: Device) -> None:
+    found = function(device, "fresnel_dielectric_mean(ior)", ior=IORS)
+    np.testing.assert_allclose(found, brdf.fresnel_dielectric_average(*of_all(IORS)), rtol=1e-5, atol=1e-7)
+    assert ((found >= 0.0) & (found <= 1.0)).all()
+
+
+def test_scattering_gain_against_its_definition(device: Device) -> None:
+    shares = (0.0, 1e-6, 0.3, 0.9, 1.0)
+    found = function(device, "scattering_gain(albedo, mean, vec3(f)).x", albedo=shares, mean=shares, f=shares)
+    assert np.isfinite(found).all()
+    assert (found >= 1.0).all()
+    albedo, mean, fresnel = of_all(shares[2:], shares[2:], shares)
+    expected = 1.0 + fresnel * mean / (1.0 - fresnel * (1.0 - mean)) * (1.0 - albedo) / albedo
+    np.testing.assert_allclose(found[2:, 2:], expected, rtol=1e-5)
+
+
+def test_ggx_lobe_against_the_oracle(device: Device) -> None:
+    cosines = (1e-3, 0.1, 0.5, 0.9, 1.0)
+    found = function(device, "ggx_lobe(h, l, v, alpha)", h=cosines, l=cosines, v=cosines, alpha=ALPHAS)
+    half, light, view, alpha = of_all(cosines, cosines, cosines, ALPHAS)
+    expected = brdf.ggx_brdf(half, light, view, np.sqrt(alpha)) * light
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+def test_ggx_lobe_stays_finite_at_its_ends(device: Device) -> None:
+    found = function(device, "ggx_lobe(h, l, v, alpha)", h=COSINES, l=COSINES, v=COSINES, alpha=(0.0, 1e-20, *ALPHAS))
+    assert np.isfinite(found).all()
+    assert (found >= 0.0).all()
+
+
+def test_table_is_read_at_its_own_points(device: Device) -> None:
+    table = brdf.albedo_table().astype(float)
+    steps = np.linspace(0.0, 1.0, brdf.ALBEDO_TABLE_SIZE)
+    fresnel, cosine, roughness = (grid.ravel() for grid in np.meshgrid(steps, steps, steps, indexing="ij"))
+    inputs = {"f0": fresnel**4, "cosine": cosine**2, "roughness": roughness}
+    found = call(device, "lookup_albedo(albedo_table, f0, cosine, roughness)", inputs, 4)
+    np.testing.assert_allclose(found, table.reshape(-1, 4), atol=2e-3)
+    beyond = {"f0": np.full(4, 0.5), "cosine": np.array([-1.0, 2.0, 0, 0]), "roughness": np.array([0, 0, -1.0, 2.0])}
+    assert np.isfinite(call(device, "lookup_albedo(albedo_table, f0, cosine, roughness)", beyond, 4)).all()
+
+
+EXTREMES = {
+    "smooth": {"roughness": 0.0},
+    "rough": {"roughness": 1.0},
+    "no interface": {"ior": 1.0, "level": 0.5},
+    "thin air": {"ior": 1e-6, "level": 0.5},
+    "diamond": {"ior": 1000.0, "level": 1e6},
+    "metal": {"metallic": 1.0},
+    "mirror": {"metallic": 1.0, "roughness": 0.0},
+}
+
+
+@pytest.mark.parametrize("color", [0.0, 1.0, 1e6])
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extreme_surfaces_reflect_finite_light(device: Device, name: str, color: float) -> None:
+    """The light and the eye at every height down to none, in one place, across, and as in a mirror."""
+    cosines = np.array([1.0, 0.5, 1e-3, 1e-7, 1e-20, 0.0])
+    light, view, turn = (g.ravel() for g in np.meshgrid(cosines, cosines, [0.0, 0.5 * np.pi, np.pi], indexing="ij"))
+    count = len(light)
+    side = [np.sqrt(1.0 - c * c) for c in (light, view)]
+    values = {"metallic": 0.0, "roughness": 0.5, "ior": 1.5, "level": 0.5} | EXTREMES[name]
+    inputs = {key: np.full(count, value) for key, value in values.items()}
+    inputs["n"] = np.tile([0.0, 0.0, 1.0], (count, 1))
+    inputs["l"] = np.stack([side[0], np.zeros(count), light], axis=1)
+    inputs["v"] = np.stack([side[1] * np.cos(turn), side[1] * np.sin(turn), view], axis=1)
+    inputs["color"] = np.full((count, 3), color)
+    inputs = {key: np.asarray(array, np.float32) for key, array in inputs.items()}
+    values = brdf_of(device, inputs, "PRINCIPLED")
+    assert np.isfinite(values).all()
+    assert (values >= 0.0).all()
+    albedo = call(device, f"diffuse_albedo({SURFACE.format(model='PRINCIPLED')}, v)", inputs)
+    assert (albedo >= 0.0).all()
+    assert (albedo <= color).all()
+
+
 def test_wider_light_blurs_the_lobe_and_mirrorless_surfaces_stay_so(device: Device) -> None:
     angles = np.array([0.0, 1e-3, 0.1, 10.0])
     widened = call(device, "widened_alpha(alpha, angle)", {"alpha": np.full(4, 0.04), "angle": angles}, 1)
