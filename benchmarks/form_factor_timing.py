@@ -20,7 +20,7 @@ TILES = 32
 # Each invocation reads a light once for so many points, or reading would cost more than the forms do.
 HELD_POINTS = 4
 GROUP_SIZE = 64
-ROUNDS = 41
+ROUNDS = 151
 EMPTY_LOOP = "empty loop"
 ROOM_M = np.array([6.0, 4.0, 3.0])
 # (boxes around all points, times that each of their twelve triangles is split in four), then small lamps. Together

@@ -18,16 +18,16 @@ bool rival_outline(vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, 
     if (dot(area_vector, a) >= 0.0 || max(max(heights.x, heights.y), heights.z) <= 0.0) {
         return false;
     }
-    bvec3 above = greaterThan(heights, vec3(0.0));
-    int count = int(above.x) + int(above.y) + int(above.z);
-    bool whole = count == 3, lone_above = count == 1;
+    bool a_above = heights.x > 0.0, b_above = heights.y > 0.0, c_above = heights.z > 0.0;
+    bool whole = a_above && b_above && c_above;
     // The corner that is alone on its side of the horizon comes first.
-    bool second = !whole && above.y == lone_above && above.x != lone_above;
-    bool third = !whole && above.z == lone_above && above.x != lone_above;
+    bool second = a_above == c_above && a_above != b_above;
+    bool third = a_above == b_above && a_above != c_above;
     vec3 first = second ? b : third ? c : a;
     vec3 next = second ? c : third ? a : b;
     vec3 last = second ? a : third ? b : c;
     vec3 h = second ? heights.yzx : third ? heights.zxy : heights;
+    bool lone_above = !whole && h.x > 0.0;
     vec3 to_next = first + (next - first) * (h.x / (whole ? 1.0 : h.x - h.y));
     vec3 to_last = first + (last - first) * (h.x / (whole ? 1.0 : h.x - h.z));
     outline.q0 = whole || lone_above ? first : next;
