@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -67,7 +67,8 @@ _EMPTY_CALL = "dot(light.v0 + light.v1 + light.v2 + light.area_vector, n) + ligh
 class Workload:
     """Points (p, 3) in tiles of TILE_POINTS neighbours, unit normals (p, 3) and lights (q, 3, 3), metres.
 
-    clipped, hidden: shares of the pairs that the horizon cuts and that send nothing.
+    clipped, hidden: shares of the pairs that the horizon cuts and that send nothing. nearest, farthest: 5th and 95th
+    percentile of the distance in bounding radii.
     """
 
     points: Float64
@@ -75,6 +76,8 @@ class Workload:
     lights: Float64
     clipped: float
     hidden: float
+    nearest: float
+    farthest: float
 
 
 @dataclass(frozen=True)
@@ -106,18 +109,25 @@ def room(random: np.random.Generator, tiles: int = TILES) -> Workload:
     size = np.exp(random.uniform(smallest, largest, (LAMPS, 1, 1)))
     lamps = random.uniform(0.0, 1.0, (LAMPS, 1, 3)) * ROOM_M + size * _unit(random.normal(size=(LAMPS, 3, 3)))
     lights = random.permutation(np.concatenate([*boxes, lamps]))
+    return _described(points, normals, lights)
+
+
+def _described(points: Float64, normals: Float64, lights: Float64) -> Workload:
+    area_vectors, radii = stored_with(lights)
     heights = np.einsum("pc,qkc->pqk", normals, lights) - (normals * points).sum(axis=1)[:, None, None]
-    in_front = np.einsum("qc,pqc->pq", stored_with(lights)[0], points[:, None] - lights[None, :, 0]) > 0.0
+    in_front = np.einsum("qc,pqc->pq", area_vectors, points[:, None] - lights[None, :, 0]) > 0.0
     above = (heights > 0.0).sum(axis=2)
     shown = in_front & (above > 0)
-    return Workload(points, normals, lights, float((shown & (above < 3)).mean()), float((~shown).mean()))
+    distances = np.linalg.norm(points[:, None] - lights.mean(axis=1), axis=2) / radii
+    nearest, farthest = (float(distance) for distance in np.quantile(distances, (0.05, 0.95)))
+    clipped, hidden = float((shown & (above < 3)).mean()), float((~shown).mean())
+    return Workload(points, normals, lights, clipped, hidden, nearest, farthest)
 
 
 def shuffled(workload: Workload, random: np.random.Generator) -> Workload:
     """The same points in an order in which neighbours have nothing in common."""
     order = random.permutation(len(workload.points))
-    points, normals = workload.points[order], workload.normals[order]
-    return Workload(points, normals, workload.lights, workload.clipped, workload.hidden)
+    return replace(workload, points=workload.points[order], normals=workload.normals[order])
 
 
 def measure(device: Device, workload: Workload, forms: Sequence[Form] = FORMS, rounds: int = ROUNDS) -> dict[str, Cost]:
