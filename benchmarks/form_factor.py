@@ -98,8 +98,8 @@ def _report(
             layout(("class", *forms), _rows(errors, forms, _failures)),
             _wrapped(
                 f"Nanoseconds per point and light, each point summing {len(workload.lights)} lights of a room; "
-                f"{workload.clipped:.0%} of the pairs are cut by the horizon, {workload.hidden:.0%} send nothing, nine in "
-                f"ten are {workload.nearest:.1f} to {workload.farthest:.0f} bounding radii apart. "
+                f"{workload.clipped:.0%} of the pairs are cut by the horizon, {workload.hidden:.0%} send nothing, nine "
+                f"in ten are {workload.nearest:.1f} to {workload.farthest:.0f} bounding radii apart. "
                 "Medians (quartiles) of rounds in which the forms take turns; net: without the empty loop; ratio: net, "
                 "to the rational fit's, round by round. Points are neighbours in place and normal, or shuffled:"
             ),
