@@ -102,7 +102,7 @@ def float32_bound(points: Array, normals: Array, polygons: Array) -> Array:
     FLOAT32_ABSOLUTE, and what conditioning takes: `vertex - point` is rounded by half a unit of its length (times
     sqrt 3 for three axes), which turns the plane through an edge and the point by that over the point's distance from
     the edge. An edge adds its angle (at most pi) times the cosine to that plane's normal, over 2 pi. Where an edge
-    touches the point this says nothing, and the bound is 1.
+    touches the point, or the point the polygon's plane within that rounding, this says nothing, and the bound is 1.
     """
     a = polygons - points[:, None]
     b = np.roll(a, -1, axis=1)
@@ -113,7 +113,12 @@ def float32_bound(points: Array, normals: Array, polygons: Array) -> Array:
     reach = np.maximum(np.linalg.norm(a, axis=-1), np.linalg.norm(b, axis=-1))
     moved = np.sqrt(3.0) * FLOAT32_UNIT * reach
     turned = np.divide(moved, distance, out=np.full_like(distance, np.inf), where=distance > 0)
-    return np.minimum(1.0, FLOAT32_ABSOLUTE + 0.5 * turned.sum(-1))
+    bound = np.minimum(1.0, FLOAT32_ABSOLUTE + 0.5 * turned.sum(-1))
+    plane_normals = np.cross(span[:, 0], span[:, 1])
+    depths = np.abs((plane_normals * a[:, 0]).sum(-1))
+    # The stored plane and the offset are rounded alike.
+    in_contact = depths <= 2.0 * moved.max(-1) * np.linalg.norm(plane_normals, axis=-1)
+    return np.where(in_contact, 1.0, bound)
 
 
 # --- named cases ------------------------------------------------------------------------------------------------------

@@ -117,9 +117,10 @@ float far_integrand(VisibleOutline outline, vec4 squared, vec4 products) {
         + outline.area_023 * midpoint_mean(vec3(h.x + h.z, 0.0, h.x), inverse.zyw);
 }
 
-// 2^-floor(log2 x): scales without rounding.
-float inverse_power_of_two(float x) {
-    return uintBitsToFloat((254u << 23) - (floatBitsToUint(x) & 0x7f800000u));
+// A power of two, which scales without rounding, that makes `radius` 1/8 to 1/4: sums of lengths stay finite wherever
+// each of them is.
+float unit_scale(float radius) {
+    return uintBitsToFloat((251u << 23) - (floatBitsToUint(radius) & 0x7f800000u));
 }
 
 // Share of the hemisphere over p with normal n that a triangle fills, cosine-weighted, clipped at the horizon; in
@@ -129,7 +130,7 @@ float inverse_power_of_two(float x) {
 float triangle_form_factor(
     vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, float bounding_radius
 ) {
-    float scale = inverse_power_of_two(bounding_radius);
+    float scale = unit_scale(bounding_radius);
     vec3 a = (v0 - p) * scale, b = (v1 - p) * scale, c = (v2 - p) * scale;
     float plane_distance_area = -dot(area_vector * scale * scale, a);
     vec3 heights = vec3(dot(n, a), dot(n, b), dot(n, c));

@@ -58,7 +58,7 @@ float far_form_factor(vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vecto
 float whole_form_factor(
     vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector, float bounding_radius
 ) {
-    float scale = inverse_power_of_two(bounding_radius);
+    float scale = unit_scale(bounding_radius);
     vec3 a = (v0 - p) * scale, b = (v1 - p) * scale, c = (v2 - p) * scale;
     float sum = edge_irradiance(b, a, n) + edge_irradiance(c, b, n) + edge_irradiance(a, c, n);
     return dot(area_vector, a) < 0.0 ? clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0) : 0.0;
