@@ -177,6 +177,18 @@ CUBE = np.array(
 """Faces of a cube seen from inside: x = 0, x = 1, y = 0, y = 1, z = 0, z = 1."""
 
 
+def room(cuts: int) -> Array:
+    """(12 cuts², 3, 3) a unit cube seen from inside, its faces cut into a grid of cells of two triangles."""
+    x = np.linspace(0.0, 1.0, cuts + 1)
+    low, high = np.meshgrid(x[:-1], x[:-1], indexing="ij"), np.meshgrid(x[1:], x[1:], indexing="ij")
+    (u0, v0), (u1, v1) = ([axis.ravel() for axis in pair] for pair in (low, high))
+    zero = np.zeros_like(u0)
+    quad = [np.stack(corner, axis=-1) for corner in ((u0, v0, zero), (u1, v0, zero), (u1, v1, zero), (u0, v1, zero))]
+    floor = np.concatenate([np.stack([quad[i] for i in tri], axis=1) for tri in ((0, 1, 2), (0, 2, 3))])
+    mirrored = np.array([1.0, 1.0, -1.0]) * floor[:, ::-1] + [0.0, 0.0, 1.0]
+    return np.concatenate([np.roll(faces, axis, axis=-1) for axis in range(3) for faces in (floor, mirrored)])
+
+
 def wall(extent: float) -> Array:
     """A wall that stands on the floor z = 0 at y = 0 and shines towards negative y."""
     return np.array([[-extent, 0, 0], [extent, 0, 0], [extent, 0, extent], [-extent, 0, extent]], float)

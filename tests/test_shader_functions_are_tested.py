@@ -29,7 +29,7 @@ def test_text():
     return "\n".join(path.read_text() for path in sorted(RENDER_TESTS.glob("test_*.py")))
 
 
-TESTED_THROUGH_PASSES = ("light_classes", "lights", "shadow")
+TESTED_THROUGH_PASSES = ("lights", "shadow")
 LIBRARY_FILES = [
     pytest.param(
         path,

@@ -34,6 +34,8 @@ vec3 normals[PIXELS];
 int tag_ids[PIXELS];
 bool shown[PIXELS];
 vec3 sums[PIXELS];
+// Of one batch of lights, added to `sums` at its end: a plain sum over 100,000 lights would lose digits.
+vec3 batch_sums[PIXELS];
 
 ivec2 pixel_at(int k) {
     ivec2 tile = ivec2(gl_WorkGroupID.xy) * (GROUP_SIDE * PIXELS_PER_SIDE);
@@ -139,7 +141,7 @@ void classify(PointGroup group, int first) {
             for (int k = 0; k < PIXELS; ++k) { \
                 float factor = FORM_FACTOR; \
                 bool is_own = light.tag_id != UNTAGGED && light.tag_id == tag_ids[k]; \
-                sums[k] += is_own ? vec3(0.0) : factor * radiosity; \
+                batch_sums[k] += is_own ? vec3(0.0) : factor * radiosity; \
             } \
         } \
     }
@@ -152,6 +154,9 @@ void main() {
     }
     for (int first = first_light; first < end_light; first += GROUP_SIZE) {
         classify(group, first);
+        for (int k = 0; k < PIXELS; ++k) {
+            batch_sums[k] = vec3(0.0);
+        }
         ADD_MEMBERS(LIGHT_IS_FAR,
             far_form_factor(positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector))
         ADD_MEMBERS(LIGHT_IS_WHOLE,
@@ -160,6 +165,9 @@ void main() {
         ADD_MEMBERS(LIGHT_IS_CLIPPED,
             triangle_form_factor(
                 positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius))
+        for (int k = 0; k < PIXELS; ++k) {
+            sums[k] += batch_sums[k];
+        }
         barrier();
     }
     for (int k = 0; k < PIXELS; ++k) {

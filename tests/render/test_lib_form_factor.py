@@ -18,6 +18,7 @@ from tests.form_factor_cases import (
     SQUARE,
     TRIANGLE,
     float32_bound,
+    room,
     single,
     summed,
     summed_bound,
@@ -181,18 +182,6 @@ def test_splitting_a_triangle_leaves_the_sum(device: Device, distance: float) ->
     points, normals, triangles = random_case(distance)
     parts = sum(shader(device, points, normals, part) for part in split(triangles))
     np.testing.assert_allclose(parts, shader(device, points, normals, triangles), rtol=0.0, atol=1e-5)
-
-
-def room(cuts: int) -> Array:
-    """(12 cuts², 3, 3) a unit cube seen from inside, its faces cut into a grid of cells of two triangles."""
-    x = np.linspace(0.0, 1.0, cuts + 1)
-    low, high = np.meshgrid(x[:-1], x[:-1], indexing="ij"), np.meshgrid(x[1:], x[1:], indexing="ij")
-    (u0, v0), (u1, v1) = ([axis.ravel() for axis in pair] for pair in (low, high))
-    zero = np.zeros_like(u0)
-    quad = [np.stack(corner, axis=-1) for corner in ((u0, v0, zero), (u1, v0, zero), (u1, v1, zero), (u0, v1, zero))]
-    floor = np.concatenate([np.stack([quad[i] for i in tri], axis=1) for tri in ((0, 1, 2), (0, 2, 3))])
-    mirrored = np.array([1.0, 1.0, -1.0]) * floor[:, ::-1] + [0.0, 0.0, 1.0]
-    return np.concatenate([np.roll(faces, axis, axis=-1) for axis in range(3) for faces in (floor, mirrored)])
 
 
 @pytest.mark.parametrize("height", [0.5, 0.1, 1e-3])

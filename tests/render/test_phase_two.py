@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.form_factor_cases import room
 from tests.render.rooms import lights_from_triangles
 from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.form_factor import polygon_form_factor
@@ -114,6 +115,15 @@ def test_neighbouring_pixels_of_one_surface_give_the_same(device: Device, curvat
     truth = expected(pixels, lights, radiosity)
     found = irradiance(device, pixels, lights, radiosity)[..., :3]
     assert found == pytest.approx(truth, rel=2e-4, abs=2e-5 * truth.max())
+
+
+def test_closed_room_of_many_lights_fills_the_hemisphere(device: Device) -> None:
+    """49,152 lights of radiosity 1 around every pixel give irradiance 1: sums in batches keep the digits."""
+    generator = np.random.default_rng(2)
+    pixels, lights = Pixels(generator, (4, 4)), lights_from_triangles(room(64).astype(np.float32))
+    pixels.positions = generator.uniform(1e-3, 1.0 - 1e-3, pixels.positions.shape).astype(np.float32)
+    found = irradiance(device, pixels, lights, np.ones((len(lights), 3), np.float32))[pixels.shown, :3]
+    assert found == pytest.approx(1.0, abs=1e-5)
 
 
 def test_pixels_without_surface_stay_zero(device: Device) -> None:

@@ -3,7 +3,7 @@
 
 Each edge gives the angle under which it is seen, along the unit normal of the plane through it and the point. That
 normal loses digits where the edge passes close by; such pairs are computed again with twice the digits,
-enough for gaps down to 1e-16 of 1e-16 of an edge's length.
+enough for gaps down to 1e-30 of an edge's length.
 
 Vectors are three arrays, one for each axis, so that the same code runs on plain and on long numbers.
 """
