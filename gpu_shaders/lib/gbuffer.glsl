@@ -25,6 +25,13 @@ bool shows_geometry(vec3 geometric_normal) {
     return dot(geometric_normal, geometric_normal) > 0.25;
 }
 
+// Depth in [0, 1] for a buffer of whole numbers: 0 at near, 1 at far, finest in proportion about the middle between
+// both. Plain z / w spends nearly all of its steps on the first few near distances. inverse_distance: 1 / m.
+float balanced_depth(float inverse_distance, float near, float far) {
+    float middle = sqrt(near * far);
+    return (1.0 - near * inverse_distance) / (1.0 + middle * inverse_distance) * ((far + middle) / (far - near));
+}
+
 Surface unpack_surface(
     vec4 position, vec4 shading_normal, vec4 geometric_normal, vec4 base_color, vec4 emission, ivec4 ids
 ) {

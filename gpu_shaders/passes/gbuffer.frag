@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What later passes know of the nearest surface in a pixel.
 #include "gpu_layout/Material"
+#include "lib/gbuffer.glsl"
 #include "lib/hash.glsl"
 #include "lib/surface.glsl"
 
@@ -16,6 +17,7 @@ layout(binding = NORMAL_UNIT) uniform sampler2D normal_map;
 uniform vec3 camera_position;   // m, from the local origin
 uniform vec3 camera_backward;   // unit
 uniform bool is_orthographic;
+uniform vec2 clip_distances;    // m, near and far
 uniform uint sample_index;
 
 in vec3 position;
@@ -74,6 +76,8 @@ void main() {
     int model = has_bit(material.flags, MATERIAL_PRINCIPLED) ? MODEL_PRINCIPLED : MODEL_DIFFUSE;
     float depth = dot(camera_position - position, camera_backward);
 
+    gl_FragDepth =
+        is_orthographic ? gl_FragCoord.z : balanced_depth(gl_FragCoord.w, clip_distances.x, clip_distances.y);
     out_position = vec4(position, depth);
     out_shading_normal = vec4(side * normal, clamp(roughness, 0.0, 1.0));
     out_geometric_normal = vec4(side * triangle_normal, clamp(metallic, 0.0, 1.0));

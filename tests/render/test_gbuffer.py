@@ -177,6 +177,27 @@ def test_a_hundredth_of_a_millimetre_decides_which_of_two_surfaces_is_nearer(dev
     assert (images["ids"][..., 1] == 1).all()
 
 
+@pytest.mark.parametrize(
+    ("distance", "gap"), [(0.01, 1e-7), (0.05, 1e-6), (20.0, 1e-4), (400.0, 0.01)], ids=lambda value: f"{value} m"
+)
+@pytest.mark.parametrize("clip_start", [0.002, 0.1])
+def test_near_and_far_surfaces_keep_their_order_between_millimetres_and_kilometres(
+    device: Device, clip_start: float, distance: float, gap: float
+) -> None:
+    if clip_start > distance:
+        clip_start = 0.5 * distance
+    width = 2.0 * distance
+    pair = [
+        quad((-distance, -distance, height), (width, 0, 0), (0, width, 0), tag_id=tag)
+        for tag, height in ((1, gap), (2, 0.0))
+    ]
+    camera = camera_at((0.3 * distance, -0.5 * distance, 0.8 * distance), (0, 0, 0))
+    camera = replace(camera, clip_start=clip_start, clip_end=2048.0)
+    images = surfaces(device, scene(pair, camera))
+    assert images["shown"].mean() > 0.5
+    assert (images["ids"][images["shown"]][:, 1] == 1).all()
+
+
 def checker() -> Texture:
     """Four texels: red and green in the lower row, blue and white in the upper one, alpha 0, 1/3, 2/3, 1."""
     pixels = np.array(

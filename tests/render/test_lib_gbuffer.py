@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.render.shader_functions import evaluate
 from vlm_addon.render.device import Device
@@ -52,3 +53,17 @@ def test_only_unit_normals_show_geometry(device: Device) -> None:
     assert evaluate(device, FILE, "shows_geometry(n) ? 1.0 : 0.0", {"n": unit}).all()
     nothing = np.array([[0, 0, 0], [-0.0, 0, 0], [1e-30, 0, 0]])
     assert not evaluate(device, FILE, "shows_geometry(n) ? 1.0 : 0.0", {"n": nothing}).any()
+
+
+@pytest.mark.parametrize(("near", "far"), [(0.002, 2048.0), (0.1, 1000.0), (1e-6, 1e6), (1.0, 1.001)])
+def test_balanced_depth_grows_from_0_to_1(device: Device, near: float, far: float) -> None:
+    distances = np.geomspace(near, far, 4001).astype(np.float32).astype(float)
+    inverse = (1.0 / distances).astype(np.float32)
+    limits = {"near": np.full(4001, near), "far": np.full(4001, far)}
+    found = evaluate(device, FILE, "balanced_depth(v, near, far)", {"v": inverse} | limits).astype(float)
+    middle = np.sqrt(near * far)
+    expected = (distances - near) / (distances + middle) * (far + middle) / (far - near)
+    np.testing.assert_allclose(found, expected, atol=4 * 2.0**-24 * far / (far - near))
+    assert (np.diff(found) >= 0.0).all()
+    assert found[0] == pytest.approx(0.0, abs=1e-6 * far / (far - near))
+    assert found[-1] == pytest.approx(1.0, abs=1e-6 * far / (far - near))

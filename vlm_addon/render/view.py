@@ -18,13 +18,15 @@ class View:
     """What the vertex and fragment stages need of a camera.
 
     clip_from_local: (4, 4) float64. position: (3,) float64, m from the local origin. backward: (3,) float64, unit,
-    against the direction of view. is_orthographic: whether all rays run along -backward.
+    against the direction of view. is_orthographic: whether all rays run along -backward. clip_distances: nearest and
+    farthest depth that shows.
     """
 
     clip_from_local: Float64
     position: Float64
     backward: Float64
     is_orthographic: bool
+    clip_distances: tuple[float, float]
 
 
 def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: tuple[float, float] = CENTRED) -> View:
@@ -44,7 +46,8 @@ def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: 
     view_from_local = np.eye(4)
     view_from_local[:3, :3] = rotation.T
     view_from_local[:3, 3] = -rotation.T @ position
-    return View(clip_from_view @ view_from_local, position, rotation[:, 2].copy(), is_orthographic)
+    clip_distances = (camera.clip_start, camera.clip_end)
+    return View(clip_from_view @ view_from_local, position, rotation[:, 2].copy(), is_orthographic, clip_distances)
 
 
 def _projection(frame: tuple[float, float, float, float], near: float, far: float, is_orthographic: bool) -> Float64:

@@ -55,7 +55,7 @@ class GBufferPass:
             for field in fields(GBuffer)
         }
         self._gbuffer = GBuffer(**images)
-        # 24 bits would not separate millimetres before a kilometre of floor
+        # 24 bits, which the shader spends evenly
         depth = context.depth_texture(size)
         self._framebuffer = context.framebuffer(list(images.values()), depth)
 
@@ -75,6 +75,7 @@ class GBufferPass:
                 "camera_position": view.position,
                 "camera_backward": view.backward,
                 "is_orthographic": view.is_orthographic,
+                "clip_distances": view.clip_distances,
                 "sample_index": sample_index,
             },
         )
