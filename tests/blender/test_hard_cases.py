@@ -47,7 +47,7 @@ CAMERAS = [
 ]
 # One sample a pixel, at its centre, so that a pixel's face is all that it shows.
 SMALL = RenderSettings(128, 96, "vlm", samples=1, shadow_resolution=512, shadow_samples=4, buffers=True)
-LARGE = replace(SMALL, width=640, height=480, shadow_resolution=1024, shadow_samples=16)
+LARGE = replace(SMALL, width=320, height=240, shadow_resolution=1024, shadow_samples=16)
 LARGE_ONLY = pytest.mark.full
 SIZES = [pytest.param(SMALL, id="small"), pytest.param(LARGE, id="large", marks=LARGE_ONLY)]
 

@@ -103,7 +103,7 @@ def test_committed_file_equals_a_fresh_build(name, fresh_folder):
     assert content_hash(committed) == content_hash(fresh)
 
 
-@pytest.mark.parametrize("name", ["cornell_box", "empty_room"])
+@pytest.mark.parametrize("name", ["cornell_box", "empty_room", "hard_cases"])
 def test_drawn_light_mesh_equals_a_fresh_build(name, fresh_folder):
     light_meshes = []
     for folder in (FOLDER, fresh_folder):
@@ -207,6 +207,22 @@ def test_hard_cases_has_ten_named_cameras():
     names = [thing.name for thing in bpy.context.scene.objects if thing.type == "CAMERA"]
     assert len(names) == 10
     assert all(name.startswith("Camera ") for name in names)
+
+
+def test_hard_cases_has_virtual_lights_at_every_station():
+    """Of every size, mirrored and squashed, in the very plane of what they stand for, and without area."""
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "hard_cases.blend"))
+    drawn = bpy.data.collections["Virtual Light Meshes"].objects
+    names = {thing.name.removesuffix(" lights") for thing in drawn}
+    stations = {"Floor", "Tower", "Props", "Walls", "Slivers", "Cloth", "Cloth facing away", "Shells"}
+    corners = {"Corner 0", "Corner 1", "Corner 2", "Corner 3", "Sheared corner"}
+    assert names == stations | corners
+    assert any(thing.matrix_world.determinant() < 0 for thing in drawn)
+    light_mesh = extract().light_mesh
+    assert 500 < len(light_mesh) < 2000
+    assert (light_mesh.areas == 0).any()
+    assert light_mesh.areas[light_mesh.areas > 0].min() < 1e-6
+    assert light_mesh.areas.max() > 1e4
 
 
 @pytest.mark.parametrize("percent", [0.1, 1.0, pytest.param(100.0, marks=pytest.mark.full)])
