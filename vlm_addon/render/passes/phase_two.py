@@ -24,6 +24,9 @@ TILE_SIDE = GROUP_SIDE * PIXELS_PER_SIDE
 # cancellation is seen; a GPU does it in some milliseconds.
 EVALUATIONS_PER_DISPATCH = 30_000_000
 MIN_LIGHTS_PER_DISPATCH = 64
+# Mesa's software renderers end all loops of an invocation after 65,535 iterations together, without a word; a light
+# takes one, and one more for each pixel of the invocation.
+MAX_LIGHTS_PER_DISPATCH = 8192
 
 
 class PhaseTwoPass:
@@ -52,7 +55,8 @@ class PhaseTwoPass:
         radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
         self._irradiance.bind_to_image(0)
         tiles_x, tiles_y = -(-width // TILE_SIDE), -(-height // TILE_SIDE)
-        chunk = max(EVALUATIONS_PER_DISPATCH // (width * height), MIN_LIGHTS_PER_DISPATCH)
+        chunk = EVALUATIONS_PER_DISPATCH // (width * height)
+        chunk = min(max(chunk, MIN_LIGHTS_PER_DISPATCH), MAX_LIGHTS_PER_DISPATCH)
         for first in range(0, lights.count, chunk):
             end = min(first + chunk, lights.count)
             set_uniforms(self._shader, {"first_light": first, "end_light": end})
