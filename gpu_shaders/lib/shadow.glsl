@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Share of a lamp's sample point that a surface point sees, from a map of nearness.
 //
-// The map holds near / distance along the face's axis, or the height along a sun's direction: larger is nearer, 0 is
-// empty. Both are linear over the map for a plane, so the receiver's own plane is known exactly at each texel: it
-// cannot shadow itself, and no absolute offset is needed.
+// The map holds near / distance along the face's axis, or the height along a sun's direction in m: larger is nearer,
+// SHADOW_EMPTY is nothing. Both are linear over the map for a plane, so the receiver's own plane is known at each texel:
+// it cannot shadow itself, and no offset is needed but what float32 rounds.
 #ifndef LIB_SHADOW
 #define LIB_SHADOW
 #include "gpu_layout/Lamp"
@@ -26,10 +26,10 @@ struct ShadowPoint {
 ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
     mat3 axes = mat3(lamp.x_axis, lamp.y_axis, lamp.z_axis);
     vec3 m = n * axes;
+    vec3 q = (p - lamp.shadow_origin) * axes;
     if (lamp.shadow_kind == SHADOW_PARALLEL) {
-        return ShadowPoint(p * axes, m, vec2(0.0));
+        return ShadowPoint(q, m, vec2(0.0));
     }
-    vec3 q = (p - lamp.sample_position) * axes;
     const vec3 flip = vec3(1.0, 1.0, -1.0);
     if (lamp.shadow_kind == SHADOW_CONE) {
         return ShadowPoint(q * flip, m * flip, vec2(0.0));
@@ -59,7 +59,6 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     }
     // Depth grows with the tangent of the angle of incidence, its change with the square of one over the cosine.
     float steepness = 1.0 / max(cos_lamp * cos_lamp, 1e-4);
-    float leaning = tilt * steepness;
     ShadowPoint receiver = shadow_point(lamp, p, n);
     vec2 tiles = lamp.shadow_kind == SHADOW_CUBE ? vec2(SHADOW_CUBE_COLUMNS, SHADOW_CUBE_ROWS) : vec2(1.0);
     vec2 map_size = vec2(textureSize(map, 0));
@@ -70,18 +69,23 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     vec2 gradient;      // of the plane's nearness, per unit of uv
     float nearness;
     float slack;        // nearness per texel of depth
+    float rounding;     // texels
     vec3 q = receiver.position;
     if (parallel) {
         uv = q.xy - lamp.shadow_centre;
-        nearness = (q.z - lamp.shadow_near) / lamp.shadow_range;
-        gradient = -receiver.normal.xy / (max(receiver.normal.z, 1e-6) * lamp.shadow_range);
-        slack = max(texel.x, texel.y) / lamp.shadow_range;
+        nearness = q.z;
+        gradient = -receiver.normal.xy / max(receiver.normal.z, 1e-6);
+        slack = max(texel.x, texel.y);
+        rounding = lamp.shadow_rounding / slack;
     } else {
         uv = q.xy / q.z;
         nearness = lamp.shadow_near / q.z;
         gradient = lamp.shadow_near * receiver.normal.xy / min(dot(receiver.normal, q), -1e-6 * q.z);
         slack = max(texel.x, texel.y) * nearness;
+        rounding = lamp.shadow_rounding / (max(texel.x, texel.y) * q.z);
     }
+    rounding *= steepness;
+    float leaning = tilt * steepness + rounding;
     vec2 place = (uv / lamp.shadow_extent * 0.5 + 0.5) * resolution;
     vec2 corner = clamp(floor(place - 0.5), vec2(0.0), resolution - 2.0);
     vec2 fraction = clamp(place - 0.5 - corner, 0.0, 1.0);
@@ -99,7 +103,7 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     float blocked = dot(weights, before * clearly);
     // Where an occluder meets the receiver it is for a moment just before it; only what lies on the plane itself then
     // tells of the receiver.
-    float nearest = blocked > 0.0 ? SHADOW_ON_PLANE * steepness : leaning;
+    float nearest = blocked > 0.0 ? SHADOW_ON_PLANE * steepness + rounding : leaning;
     vec4 on_it = vec4(lessThanEqual(depth, vec4(nearest))) * vec4(greaterThanEqual(depth, vec4(-SHADOW_BEYOND - leaning)));
     float seen = dot(weights, on_it);
     if (seen > 0.0) {

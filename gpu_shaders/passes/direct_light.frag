@@ -15,8 +15,17 @@ uniform vec3 camera_position;   // m, from the local origin
 uniform vec3 camera_backward;   // unit
 uniform bool is_orthographic;
 uniform float weight;           // of this sample of the lamp in this picture
+uniform vec2 distances;         // from the eye, outer and inner, between which this shadow map counts, m; 0 for no end
 
 layout(location = 0) out vec4 out_radiance; // W/(m² sr)
+
+// Share of this shadow map among those of the windows around the eye; over all of them they sum to 1.
+float window_share(vec3 position) {
+    float from_eye = distance(position, camera_position);
+    float inside = distances.x > 0.0 ? 1.0 - smoothstep(WINDOW_FADE * distances.x, distances.x, from_eye) : 1.0;
+    float beyond = distances.y > 0.0 ? smoothstep(WINDOW_FADE * distances.y, distances.y, from_eye) : 1.0;
+    return inside * beyond;
+}
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -33,6 +42,10 @@ void main() {
     lamp.radius = lamp.falloff_radius_squared = 0.0;
 #endif
     vec3 position = texelFetch(gbuffer_position, pixel, 0).xyz;
+    float share = weight * window_share(position);
+    if (share <= 0.0) {
+        return;
+    }
     vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
     vec3 irradiance = lamp_irradiance(lamp, position, normal);
     LampRay ray = lamp_ray(lamp, position);
@@ -50,5 +63,5 @@ void main() {
     reflector.alpha = widened_alpha(reflector.alpha, ray.solid_angle);
     vec3 radiance = reflector.diffuse * INVERSE_PI * irradiance
         + specular_reflection(reflector, normal, ray.direction, to_camera) * specular_irradiance;
-    out_radiance = vec4(weight * lit * radiance, 0.0);
+    out_radiance = vec4(share * lit * radiance, 0.0);
 }

@@ -18,6 +18,7 @@ layout(binding = SHADOW_MAP_UNIT) uniform sampler2D shadow_map;
 
 uniform float share;        // of the lamp that this sample stands for
 uniform int light_count;
+uniform int window;         // only of samples that this one shows; -1 for all
 
 void main() {
     int index = int(gl_GlobalInvocationID.x);
@@ -29,6 +30,9 @@ void main() {
     vec3 irradiance = vec3(0.0);
     for (int i = light.first_sample; i < light.end_sample; ++i) {
         SourceSample source = source_samples[i];
+        if (window >= 0 && source.window != window) {
+            continue;
+        }
         vec3 unshadowed = lamp_irradiance(lamp, source.position, source.normal);
         if (max(max(unshadowed.r, unshadowed.g), unshadowed.b) > 0.0) {
             irradiance += source.weight * lit_share(shadow_map, lamp, source.position, source.normal, NORMAL_TILT) * unshadowed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Nearness of an occluder to its lamp: near / distance, or the height towards the sun in [0, 1]. Blending keeps the
-// largest, since float32 holds it better than a depth buffer of 24 bits.
+// Nearness of an occluder to its lamp: near / distance, or the height towards the sun in m. Blending keeps the largest,
+// since float32 holds it better than a depth buffer of 24 bits.
 #ifdef HAS_ALPHA
 #include "gpu_layout/Material"
 #include "lib/hash.glsl"
@@ -18,6 +18,8 @@ flat in ivec2 triangle_ids;
 uniform bool is_parallel;
 uniform float shadow_near;
 
+in float height;
+
 layout(location = 0) out float nearness;
 
 void main() {
@@ -31,5 +33,5 @@ void main() {
         discard;
     }
 #endif
-    nearness = is_parallel ? 1.0 - gl_FragCoord.z : shadow_near * gl_FragCoord.w;
+    nearness = is_parallel ? height : shadow_near * gl_FragCoord.w;
 }

@@ -8,9 +8,14 @@ out vec2 uv;
 flat out ivec2 triangle_ids; // material, face id
 #endif
 
-uniform mat4 clip_from_local;
+uniform mat4 clip_from_shadow;
+uniform vec3 shadow_origin;     // m, from the local origin
+uniform vec3 towards_sun;       // unit; of a parallel map
+uniform bool is_parallel;
 
 in vec3 in_position;
+
+out float height;               // m, above the shadow's origin
 
 void main() {
 #ifdef HAS_ALPHA
@@ -18,5 +23,10 @@ void main() {
     uv = in_uv;
     triangle_ids = ivec2(triangle.material, triangle.face_id);
 #endif
-    gl_Position = clip_from_local * vec4(in_position, 1.0);
+    vec3 offset = in_position - shadow_origin;
+    height = dot(offset, towards_sun);
+    gl_Position = clip_from_shadow * vec4(offset, 1.0);
+    if (is_parallel) {
+        gl_Position.z = 0.0; // nothing is too near or too far
+    }
 }

@@ -91,9 +91,17 @@ VIRTUAL_LIGHT = GpuStruct(
 
 TRIANGLE = GpuStruct(
     "Triangle",
-    (("vec3", "geometric_normal"), ("int", "material"), ("int", "tag_id"), ("int", "face_id")),
+    (
+        ("vec3", "geometric_normal"),
+        ("int", "material"),
+        ("int", "tag_id"),
+        ("int", "face_id"),
+        ("float", "plane_offset"),
+        ("float", "reach"),
+    ),
 )
-"""What is constant over one visible triangle; face_id counts the triangles of the snapshot in order."""
+"""What is constant over one visible triangle; face_id counts the triangles of the snapshot in order. plane_offset:
+distance of its plane from the local origin along the normal; reach: of its farthest corner from there."""
 
 MATERIAL = GpuStruct(
     "Material",
@@ -138,11 +146,12 @@ LAMP = GpuStruct(
         ("vec4", "corners_67"),
         ("vec2", "shadow_extent"),
         ("vec2", "shadow_centre"),
+        ("vec3", "shadow_origin"),
         ("float", "shadow_near"),
-        ("float", "shadow_range"),
+        ("vec2", "cell_centre"),
         ("int", "shadow_kind"),
         ("float", "sample_weight"),
-        ("vec2", "cell_centre"),
+        ("float", "shadow_rounding"),
     ),
 )
 """One sample of a lamp and the frame of its shadow map; filled by render/lamp_records.py, read by lib/lights.glsl.
@@ -151,11 +160,15 @@ position: m from the local origin, for LAMP_SUN the unit vector towards it; samp
 come from. radius: m, for LAMP_SUN the sine of half its angle. intensity: W/sr; LAMP_SUN irradiance, LAMP_AREA
 radiosity of its cell over the cell's share, W/m². corners: pairs of (x, y) on an area lamp, m from `position`, counter-
 clockwise seen from its shining side. shadow_extent: tangent of half the field of view, for SHADOW_PARALLEL half the
-size in m. shadow_near: m, nearest distance in a perspective map; for SHADOW_PARALLEL lowest height along z_axis.
+size in m. shadow_origin: where the map's coordinates and depths start; shadow_centre: of a parallel map, m from there.
+shadow_near: m, nearest distance in a perspective map. shadow_rounding: m, what float32 leaves of a surface's place.
 """
 
-SOURCE_SAMPLE = GpuStruct("SourceSample", (("vec3", "position"), ("float", "weight"), ("vec3", "normal")))
-"""A point on the visible surface where phase one measures irradiance; position in m from the local origin."""
+SOURCE_SAMPLE = GpuStruct(
+    "SourceSample", (("vec3", "position"), ("float", "weight"), ("vec3", "normal"), ("int", "window"))
+)
+"""A point on the visible surface where phase one measures irradiance; position in m from the local origin; window: of
+a sun's shadow map that shows it best."""
 
 SOURCE_LIGHT = GpuStruct("SourceLight", (("vec3", "reflectance"), ("int", "first_sample"), ("int", "end_sample")))
 """What phase one needs of a virtual light; reflectance: colour times strength."""

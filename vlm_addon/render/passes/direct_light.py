@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS, LAMP
 from ..shader_library import ShaderLibrary, set_uniforms
+from ..shadow_windows import ALL_DISTANCES, FADE, view_windows
 from ..view import View
+from .distance_range import DistanceRange
 from .gbuffer import GBuffer
 from .shadow_map import LampShadows, ShadowMap
 
@@ -33,6 +36,7 @@ class DirectLightPass:
         self._variants: dict[tuple[int, int, bool], FullscreenPass] = {}
         self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
         self._albedo = AlbedoTexture(context)
+        self._distances = DistanceRange(context, shaders)
 
     def render(
         self,
@@ -55,13 +59,20 @@ class DirectLightPass:
             "camera_backward": view.backward,
             "is_orthographic": view.is_orthographic,
         }
+        uses_windows = [shadows.uses_windows(lamp) for lamp in range(len(shadows.lights))]
+        windows = (ALL_DISTANCES,)
+        if any(uses_windows):
+            windows = view_windows(view, *shadows.bounds, *self._distances.measure(gbuffer, view))
         for lamp in range(len(shadows.lights)):
             # A picture of few samples still gets enough points of each soft lamp.
             together = shadows.samples_of(lamp, -(-shadow_samples // sample_count))
             for part in range(together):
                 index = sample_index * together + part
-                shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together)
-                self._add(gbuffer, shadow_map, {**camera, "weight": 1.0 / together})
+                for part_of_view in windows if uses_windows[lamp] else (ALL_DISTANCES,):
+                    shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together, part_of_view.window)
+                    outer = part_of_view.outer if part_of_view.outer < math.inf else 0.0
+                    uniforms = {"weight": 1.0 / together, "distances": (outer, part_of_view.inner)}
+                    self._add(gbuffer, shadow_map, camera | uniforms)
         return self._radiance
 
     def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, uniforms: dict[str, Any]) -> None:
@@ -80,6 +91,9 @@ class DirectLightPass:
         """The pass compiled for lamps of this kind."""
         key = (int(lamp["kind"]), int(lamp["shadow_kind"]), bool(lamp["radius"] > 0.0))
         if key not in self._variants:
-            defines = dict(zip(("LAMP_KIND", "SHADOW_KIND", "HAS_RADIUS"), key, strict=True))
+            defines: dict[str, int | float | bool] = dict(
+                zip(("LAMP_KIND", "SHADOW_KIND", "HAS_RADIUS"), key, strict=True)
+            )
+            defines["WINDOW_FADE"] = FADE
             self._variants[key] = FullscreenPass(self._context, self._shaders, "passes/direct_light.frag", defines)
         return self._variants[key]

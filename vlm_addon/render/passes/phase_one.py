@@ -13,12 +13,14 @@ from ...core.progress import Progress, silent, step
 from ...core.scene import Float32, Float64
 from ..gpu_layout import CONSTANTS, LAMP, SOURCE_LIGHT, SOURCE_SAMPLE
 from ..shader_library import ShaderLibrary, set_uniforms
+from ..shadow_windows import WHOLE_SCENE, ShadowWindow, sample_windows
 from .shadow_map import LampShadows
 
 if TYPE_CHECKING:
     import moderngl
 
 GROUP_SIZE = 64
+ANY_WINDOW = -1
 
 
 class PhaseOnePass:
@@ -51,16 +53,19 @@ class PhaseOnePass:
             return radiosity
         samples, lights = source_records(light_mesh, origin)
         self._require_room(samples.nbytes, len(samples))
+        windows = _assign_windows(samples, light_mesh, shadows)
         buffers = {"SOURCE_SAMPLE_BINDING": samples.tobytes() or bytes(16), "SOURCE_LIGHT_BINDING": lights.tobytes()}
         held = {name: self._context.buffer(data) for name, data in buffers.items()}
         runs = [
-            (lamp, sample, shadows.samples_of(lamp, shadow_samples))
+            (lamp, sample, window)
             for lamp in range(len(shadows.lights))
             for sample in range(shadows.samples_of(lamp, shadow_samples))
+            for window in (windows if shadows.uses_windows(lamp) else {ANY_WINDOW: None})
         ]
-        for done, (lamp, sample, sample_count) in enumerate(runs):
+        for done, (lamp, sample, window) in enumerate(runs):
             step(progress, done / len(runs), "phase one")
-            shadow_map = shadows.shadow_map(lamp, sample, sample_count)
+            sample_count = shadows.samples_of(lamp, shadow_samples)
+            shadow_map = shadows.shadow_map(lamp, sample, sample_count, window=windows.get(window))
             # New storage: llvmpipe (Mesa 22) lets a write overtake work that still reads the old one.
             self._lamp.orphan()
             self._lamp.write(shadow_map.record.tobytes())
@@ -69,7 +74,7 @@ class PhaseOnePass:
                 buffer.bind_to_storage_buffer(int(CONSTANTS[name]))
             radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
             shadow_map.bind()
-            set_uniforms(self._shader, {"share": 1.0 / sample_count, "light_count": count})
+            set_uniforms(self._shader, {"share": 1.0 / sample_count, "light_count": count, "window": window})
             self._shader.run(-(-count // GROUP_SIZE))
             self._context.memory_barrier()
         return radiosity
@@ -92,6 +97,20 @@ def source_records(light_mesh: VirtualLightMesh, origin: Float64) -> tuple[np.nd
     lights["reflectance"] = light_mesh.strength[:, None] * light_mesh.colour
     lights["first_sample"], lights["end_sample"] = samples.offsets[:-1], samples.offsets[1:]
     return points, lights
+
+
+def _assign_windows(
+    samples: np.ndarray, light_mesh: VirtualLightMesh, shadows: LampShadows
+) -> dict[int, ShadowWindow | None]:
+    """The windows of suns' maps that hold source samples; fills the field `window` of their records."""
+    suns = [lamp for lamp in range(len(shadows.lights)) if shadows.uses_windows(lamp)]
+    if not suns:
+        return {WHOLE_SCENE: None}
+    counts = np.diff(light_mesh.samples.offsets)
+    spacings = np.repeat(np.sqrt(light_mesh.areas / np.maximum(counts, 1)), counts)
+    side = min(shadows.side(lamp) for lamp in suns)
+    windows, samples["window"] = sample_windows(samples["position"].astype(np.float64), spacings, *shadows.bounds, side)
+    return {int(index): windows[index] for index in np.unique(samples["window"])}
 
 
 def read_radiosity(buffer: moderngl.Buffer, count: int) -> Float32:

@@ -16,6 +16,7 @@ from ..geometry import GpuGeometry
 from ..gpu_layout import CONSTANTS
 from ..lamp_records import lamp_record
 from ..shader_library import ShaderLibrary, set_uniforms
+from ..shadow_windows import ShadowWindow
 
 if TYPE_CHECKING:
     import moderngl
@@ -36,6 +37,10 @@ LEAST_RESOLUTION = 16
 MARGIN = 2.0
 # Nearest occluder that counts, of the distance to the farthest: no precision depends on it.
 NEAREST = 1e-6
+# Rounding of a vertex and of its interpolation, of half the scene's diagonal.
+ROUNDING = 2.0**-22
+# Height of what a sun's map does not show, m.
+EMPTY_HEIGHT = -1e30
 # Bytes of maps that are kept for all samples of a frame; further lamps are drawn again.
 CACHE_BYTES = 1 << 29
 
@@ -44,7 +49,7 @@ CACHE_BYTES = 1 << 29
 class ShadowMap:
     """A lamp's sample and what it sees.
 
-    texture: R32F of nearness, unfiltered. record: (1,) of gpu_layout.LAMP.
+    texture: R32F of nearness as in lib/shadow.glsl, unfiltered. record: (1,) of gpu_layout.LAMP.
     """
 
     texture: moderngl.Texture
@@ -99,10 +104,12 @@ class ShadowMapPass:
         sample_count: int,
         together: int = 1,
         texture: moderngl.Texture | None = None,
+        window: ShadowWindow | None = None,
     ) -> ShadowMap:
         """The map of one of `sample_count` points of `light`, drawn over `texture` if one is given.
 
-        together: how many consecutive points are used in one picture.
+        together: how many consecutive points are used in one picture. window: the part of the scene that the map of a
+        SUN must show; all of it by default.
 
         A lamp that casts no shadow, or a scene without triangles, gives an empty map.
         """
@@ -112,10 +119,11 @@ class ShadowMapPass:
         if not light.casts_shadow or geometry.triangle_count == 0:
             return ShadowMap(self._empty, record)
         record["shadow_kind"] = CONSTANTS[shadow_kind(light)]
+        record["shadow_rounding"] = ROUNDING * 0.5 * float(np.linalg.norm(geometry.high - geometry.low))
         target = texture or self.new_texture(light)
         framebuffer = self._context.framebuffer([target])
-        framebuffer.clear()
-        for matrix, viewport in self._views(light, record, geometry):
+        framebuffer.clear(red=EMPTY_HEIGHT if light.kind == SUN else 0.0)
+        for matrix, viewport in self._views(light, record, geometry, window):
             framebuffer.viewport = viewport
             self._draw(framebuffer, geometry, matrix, record, sample_index)
         return ShadowMap(target, record)
@@ -124,7 +132,7 @@ class ShadowMapPass:
         self,
         framebuffer: moderngl.Framebuffer,
         geometry: GpuGeometry,
-        clip_from_local: Float64,
+        clip_from_shadow: Float64,
         record: np.ndarray,
         sample_index: int,
     ) -> None:
@@ -135,7 +143,9 @@ class ShadowMapPass:
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         self._context.blend_equation = moderngl.MAX  # type: ignore[assignment]
         uniforms = {
-            "clip_from_local": clip_from_local,
+            "clip_from_shadow": clip_from_shadow,
+            "shadow_origin": record["shadow_origin"][0],
+            "towards_sun": record["z_axis"][0],
             "is_parallel": int(record["shadow_kind"][0]) == CONSTANTS["SHADOW_PARALLEL"],
             "shadow_near": float(record["shadow_near"][0]),
             "sample_index": sample_index,
@@ -149,14 +159,20 @@ class ShadowMapPass:
         self._context.blend_equation = moderngl.FUNC_ADD  # type: ignore[assignment]
 
     def _views(
-        self, light: Light, record: np.ndarray, geometry: GpuGeometry
+        self, light: Light, record: np.ndarray, geometry: GpuGeometry, window: ShadowWindow | None
     ) -> list[tuple[Float64, tuple[int, int, int, int]]]:
-        """Matrix from local to clip space and viewport of each tile; fills the shadow fields of `record`."""
+        """Matrix to clip space from the offset to `shadow_origin`, and viewport of each tile; fills the shadow fields
+        of `record`."""
         corners = _box_corners(geometry.low, geometry.high)
         axes = np.array([record[name][0] for name in ("x_axis", "y_axis", "z_axis")], np.float64)
         width, height = self.size(light)
         if light.kind == SUN:
-            return [(_parallel_view(record, corners @ axes.T, axes, width), (0, 0, width, height))]
+            if window is None:
+                matrix = _fitted_view(record, corners, axes, width)
+            else:
+                matrix = _window_view(record, window, 0.5 * (geometry.low + geometry.high), axes, width)
+            return [(matrix, (0, 0, width, height))]
+        record["shadow_origin"] = record["sample_position"]
         origin = record["sample_position"][0].astype(np.float64)
         seen = (corners - origin) @ axes.T
         near = NEAREST * float(np.linalg.norm(seen, axis=1).max())
@@ -164,12 +180,12 @@ class ShadowMapPass:
         if shadow_kind(light) == "SHADOW_CONE":
             tangents = math.tan(0.5 * light.spot_angle) * np.array(light.spot_scale) / (1.0 - 2.0 * MARGIN / width)
             record["shadow_extent"] = tangents
-            return [(_perspective(axes, origin, FRONT_FACE, tangents, near), (0, 0, width, height))]
+            return [(_perspective(axes, FRONT_FACE, tangents, near), (0, 0, width, height))]
         side = self._face(light)
         tangents = np.full(2, 1.0 / (1.0 - 2.0 * MARGIN / side))
         record["shadow_extent"] = tangents
         return [
-            (_perspective(axes, origin, face, tangents, near), _tile(face, side))
+            (_perspective(axes, face, tangents, near), _tile(face, side))
             for face in range(len(CUBE_FACES))
             if _may_see(light, face, seen, float(tangents[0]))
         ]
@@ -205,29 +221,42 @@ def _may_see(light: Light, face: int, seen: Float64, tangent: float) -> bool:
     return not any((side * way > tangent * forward).all() for side in sides for way in (1.0, -1.0))
 
 
-def _perspective(axes: Float64, origin: Float64, face: int, tangents: Float64, near: float) -> Float64:
+def _perspective(axes: Float64, face: int, tangents: Float64, near: float) -> Float64:
     """Clip matrix of a face with w = distance along its axis, without far plane."""
     axis, sign = CUBE_FACES[face]
     right, up, forward = axes[(axis + 1) % 3], axes[(axis + 2) % 3], sign * axes[axis]
-    rows = np.array([right / tangents[0], up / tangents[1], forward, forward])
-    matrix = np.concatenate([rows, -(rows @ origin)[:, None]], axis=1)
-    matrix[2, 3] -= 2.0 * near
+    matrix = np.zeros((4, 4))
+    matrix[:, :3] = right / tangents[0], up / tangents[1], forward, forward
+    matrix[2, 3] = -2.0 * near
     return matrix
 
 
-def _parallel_view(record: np.ndarray, seen: Float64, axes: Float64, side: int) -> Float64:
-    """Clip matrix that fits the bounds `seen` (8, 3) in the sun's frame; depth grows away from the sun."""
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    centre = 0.5 * (low + high)
+def _fitted_view(record: np.ndarray, corners: Float64, axes: Float64, side: int) -> Float64:
+    """Clip matrix of a parallel map that fits `corners` (8, 3)."""
+    middle = corners.mean(axis=0)
+    seen = (corners - middle) @ axes.T
     # A flat or empty extent still gets a size.
-    least = 1e-6 * max(float(np.abs(seen).max()), float((high - low).max()), 1e-30)
-    half = np.maximum(0.5 * (high - low), least) / (1.0 - 2.0 * MARGIN / side)
-    record["shadow_extent"], record["shadow_centre"] = half[:2], centre[:2]
-    record["shadow_near"], record["shadow_range"] = centre[2] - half[2], 2.0 * half[2]
-    matrix = np.eye(4)
-    matrix[:3, :3] = axes / half[:, None]
-    matrix[:3, 3] = -centre / half
-    matrix[2] *= -1.0
+    least = 1e-6 * max(float(np.abs(corners).max()), float(np.abs(seen).max()), 1e-30)
+    half = np.maximum(np.abs(seen[:, :2]).max(axis=0), least) / (1.0 - 2.0 * MARGIN / side)
+    return _parallel(record, middle, np.zeros(2), half, axes)
+
+
+def _window_view(record: np.ndarray, window: ShadowWindow, anchor: Float64, axes: Float64, side: int) -> Float64:
+    """Clip matrix of a parallel map of `window`. Its texels lie on a grid through `anchor`, wherever the window is."""
+    texel = 2.0 * window.radius / (side - 2.0 * (MARGIN + 1.0))
+    centre = np.array(window.centre)
+    place = (centre - anchor) @ axes[:2].T
+    return _parallel(record, centre, texel * np.round(place / texel) - place, np.full(2, 0.5 * side * texel), axes)
+
+
+def _parallel(record: np.ndarray, origin: Float64, centre: Float64, half: Float64, axes: Float64) -> Float64:
+    """Clip matrix of a parallel map; depth is not clipped."""
+    record["shadow_origin"] = origin
+    # What is lost in rounding the origin is given back.
+    centre = centre + (origin - record["shadow_origin"][0].astype(np.float64)) @ axes[:2].T
+    record["shadow_extent"], record["shadow_centre"] = half, centre
+    matrix = np.zeros((4, 4))
+    matrix[:2, :3], matrix[:2, 3], matrix[3, 3] = axes[:2] / half[:, None], -centre / half, 1.0
     return matrix
 
 
@@ -245,27 +274,49 @@ class LampShadows:
         self.lights = tuple(lights)
         self._geometry = geometry
         self._pass = ShadowMapPass(context, shaders, resolution)
-        self._kept: dict[int, ShadowMap] = {}
+        self._kept: dict[tuple[int, ShadowWindow | None], ShadowMap] = {}
         self._kept_bytes = 0
         self._shared: dict[tuple[int, int], moderngl.Texture] = {}
 
-    def shadow_map(self, lamp_index: int, sample_index: int, sample_count: int, together: int = 1) -> ShadowMap:
+    @property
+    def bounds(self) -> tuple[Float64, Float64]:
+        """Lower and upper corner of all that casts shadows, (3,) float64, m from the local origin."""
+        return self._geometry.low, self._geometry.high
+
+    def uses_windows(self, lamp_index: int) -> bool:
+        """Whether the lamp's map can be confined to a part of the scene."""
+        light = self.lights[lamp_index]
+        return light.kind == SUN and light.casts_shadow and self._geometry.triangle_count > 0
+
+    def side(self, lamp_index: int) -> int:
+        """Texels along the lamp's map."""
+        return self._pass.size(self.lights[lamp_index])[0]
+
+    def shadow_map(
+        self,
+        lamp_index: int,
+        sample_index: int,
+        sample_count: int,
+        together: int = 1,
+        window: ShadowWindow | None = None,
+    ) -> ShadowMap:
         """The map of one of `sample_count` samples of a lamp; valid until the next call for another one.
 
-        together: how many consecutive samples are used in one picture.
+        together: how many consecutive samples are used in one picture. window: as in ShadowMapPass.render.
         """
-        if lamp_index in self._kept:
-            return self._kept[lamp_index]
+        key = (lamp_index, window)
+        if key in self._kept:
+            return self._kept[key]
         light = self.lights[lamp_index]
         width, height = self._pass.size(light)
         if self._changes(light) or self._kept_bytes >= CACHE_BYTES:
             if (width, height) not in self._shared:
                 self._shared[width, height] = self._pass.new_texture(light)
             texture = self._shared[width, height]
-            return self._pass.render(self._geometry, light, sample_index, sample_count, together, texture)
-        self._kept[lamp_index] = self._pass.render(self._geometry, light, sample_index, sample_count)
+            return self._pass.render(self._geometry, light, sample_index, sample_count, together, texture, window)
+        self._kept[key] = self._pass.render(self._geometry, light, sample_index, sample_count, window=window)
         self._kept_bytes += 4 * width * height
-        return self._kept[lamp_index]
+        return self._kept[key]
 
     def samples_of(self, lamp_index: int, most: int) -> int:
         """How many samples of a lamp differ, at most `most`."""

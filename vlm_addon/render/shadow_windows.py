@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of a scene that get shadow maps of their own under a sun, so that a millimetre shows before a kilometre.
+
+Direct light uses spheres nested around the eye: a surface point at a distance is looked up in the smallest of them that
+holds it, and near a sphere's end it fades into the next (cascades, Engel 2006; around the eye as clipmaps, Losasso and
+Hoppe 2004). Phase one, which has no eye, uses spheres around the source samples of lights that are small for the map of
+the whole scene. Where the map of the whole scene is fine enough there is no other.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core.scene import Float64, Int32
+from .view import View
+
+WHOLE_SCENE = 0
+"""Index of the window that holds everything."""
+STEP = 8.0
+"""Each window's radius over the next smaller one's."""
+MOST_NESTED = 7
+"""Windows around the eye: beyond, float32 does not hold the vertices' places in them."""
+MOST_OF_SAMPLES = 12
+"""Windows of phase one."""
+FADE = 0.8
+"""Share of a sphere's radius from which on it fades into the next larger."""
+# A window's centre lies on a grid of this part of its radius: small moves of the eye leave its map as it is.
+_GRID = 0.125
+_REACH = 1.0 - 0.5 * math.sqrt(3.0) * _GRID
+# Texels that a light's source samples may lie apart at least.
+_SPACING_TEXELS = 0.5
+
+
+@dataclass(frozen=True)
+class ShadowWindow:
+    """A sphere whose surfaces a shadow map must show. centre: m from the local origin; radius: m."""
+
+    centre: tuple[float, float, float]
+    radius: float
+
+
+@dataclass(frozen=True)
+class ViewWindow:
+    """A window around the eye; None for the whole scene. It counts for surface points between two distances from the
+    eye, m: it fades out between FADE of the outer one and that one, and in towards the inner one likewise."""
+
+    window: ShadowWindow | None
+    outer: float
+    inner: float
+
+
+ALL_DISTANCES = ViewWindow(None, math.inf, 0.0)
+
+
+def view_windows(view: View, low: Float64, high: Float64, nearest: float, farthest: float) -> tuple[ViewWindow, ...]:
+    """The windows that surface points between two distances from the eye need, the largest first.
+
+    low, high: (3,) bounds of the scene, m from the local origin. An orthographic eye gets one window.
+    """
+    radius = 0.5 * float(np.linalg.norm(high - low))
+    if view.is_orthographic or not 0.0 < radius < math.inf or not farthest >= nearest:
+        return (ALL_DISTANCES,)
+    forward, cosine = _cone(view)
+    # The sphere around a cone of length 1 from its apex: its radius, and the distance of its centre.
+    narrow = cosine > math.sqrt(0.5)
+    sphere = 0.5 / cosine if narrow else math.sqrt(1.0 - cosine * cosine)
+    along = sphere if narrow else cosine
+    windows = []
+    outer = math.inf
+    for level in range(MOST_NESTED + 1):
+        size = radius * STEP**-level
+        inner = size / STEP * _REACH / sphere if level < MOST_NESTED else 0.0
+        # Left out where no point would be looked up in it.
+        if outer > nearest and FADE * inner < farthest:
+            window = None
+            if level > 0:
+                centre = _on_grid(view.position + along * outer * forward, 0.5 * (low + high), _GRID * size)
+                window = ShadowWindow(centre, size)
+            windows.append(ViewWindow(window, outer, inner if inner > nearest else 0.0))
+        outer = inner
+    return tuple(windows)
+
+
+def _cone(view: View) -> tuple[Float64, float]:
+    """Axis, unit, and cosine of half the angle of the cone around a perspective view."""
+    corners = np.array([[x, y, 0.0, 1.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
+    points = np.linalg.solve(view.clip_from_local, corners.T).T
+    rays = points[:, :3] / points[:, 3:] - view.position
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    axis = rays.sum(axis=0)
+    axis = axis / np.linalg.norm(axis)
+    return axis, float((rays @ axis).min())
+
+
+def _on_grid(point: Float64, anchor: Float64, grain: float) -> tuple[float, float, float]:
+    x, y, z = (anchor + grain * np.round((point - anchor) / grain)).tolist()
+    return x, y, z
+
+
+def sample_windows(
+    points: Float64, spacings: Float64, low: Float64, high: Float64, resolution: int
+) -> tuple[tuple[ShadowWindow | None, ...], Int32]:
+    """Windows for source samples, and for each of them (n,) the index of its window; the first is the whole scene.
+
+    points: (n, 3), m from the local origin. spacings: (n,) m between a light's samples; 0 for one that needs nothing.
+    low, high: (3,) bounds of the scene likewise. resolution: texels along a sun's map.
+    """
+    radius = 0.5 * float(np.linalg.norm(high - low))
+    windows: list[ShadowWindow | None] = [None]
+    indices = np.full(len(points), WHOLE_SCENE, np.int32)
+    if not 0.0 < radius < math.inf:
+        return tuple(windows), indices
+    wanted = np.where(spacings > 0.0, spacings / _SPACING_TEXELS, np.inf)
+    found = 2.0 * radius / (resolution * wanted)
+    levels = np.clip(np.ceil(np.log(np.maximum(found, 1.0)) / math.log(STEP)), 0, MOST_NESTED).astype(int)
+    for level in range(1, int(levels.max(initial=0)) + 1):
+        size = radius * STEP**-level
+        left = levels >= level
+        while left.any() and len(windows) <= MOST_OF_SAMPLES:
+            window, held = _window_around(points, left, size)
+            indices[held & (levels >= level)] = len(windows)
+            windows.append(window)
+            left &= ~held
+    return tuple(windows), indices
+
+
+def _window_around(
+    points: Float64, wanted: npt.NDArray[np.bool_], size: float
+) -> tuple[ShadowWindow, npt.NDArray[np.bool_]]:
+    """A window of radius `size` at the first of the wanted points, moved to the middle of those near it; the points
+    that it holds."""
+    first = points[np.argmax(wanted)]
+    near = points[wanted & (((points - first) ** 2).sum(-1) <= size * size)]
+    middle = 0.5 * (near.min(axis=0) + near.max(axis=0))
+    if ((first - middle) ** 2).sum() > size * size:
+        middle = first
+    x, y, z = middle.tolist()
+    return ShadowWindow((x, y, z), size), ((points - middle) ** 2).sum(-1) <= size * size
