@@ -20,9 +20,9 @@ from .view import View
 
 WHOLE_SCENE = 0
 """Index of the window that holds everything."""
-STEP = 8.0
+STEP = 4.0
 """Each window's radius over the next smaller one's."""
-MOST_NESTED = 7
+MOST_NESTED = 10
 """Windows around the eye: beyond, float32 does not hold the vertices' places in them."""
 MOST_OF_SAMPLES = 12
 """Windows of phase one."""
@@ -59,11 +59,15 @@ ALL_DISTANCES = ViewWindow(None, math.inf, 0.0)
 def view_windows(view: View, low: Float64, high: Float64, nearest: float, farthest: float) -> tuple[ViewWindow, ...]:
     """The windows that surface points between two distances from the eye need, the largest first.
 
-    low, high: (3,) bounds of the scene, m from the local origin. An orthographic eye gets one window.
+    low, high: (3,) bounds of the scene, m from the local origin. An orthographic eye sees everything equally large and
+    gets a single window.
     """
     radius = 0.5 * float(np.linalg.norm(high - low))
-    if view.is_orthographic or not 0.0 < radius < math.inf or not farthest >= nearest:
+    if not 0.0 < radius < math.inf or not farthest >= nearest:
         return (ALL_DISTANCES,)
+    middle = 0.5 * (low + high)
+    if view.is_orthographic:
+        return (_orthographic_window(view, middle, radius, nearest, farthest),)
     forward, cosine = _cone(view)
     # The sphere around a cone of length 1 from its apex: its radius, and the distance of its centre.
     narrow = cosine > math.sqrt(0.5)
@@ -78,18 +82,40 @@ def view_windows(view: View, low: Float64, high: Float64, nearest: float, farthe
         if outer > nearest and FADE * inner < farthest:
             window = None
             if level > 0:
-                centre = _on_grid(view.position + along * outer * forward, 0.5 * (low + high), _GRID * size)
+                centre = _on_grid(view.position + along * outer * forward, middle, _GRID * size)
                 window = ShadowWindow(centre, size)
             windows.append(ViewWindow(window, outer, inner if inner > nearest else 0.0))
         outer = inner
     return tuple(windows)
 
 
-def _cone(view: View) -> tuple[Float64, float]:
-    """Axis, unit, and cosine of half the angle of the cone around a perspective view."""
+def _orthographic_window(view: View, middle: Float64, scene: float, nearest: float, farthest: float) -> ViewWindow:
+    corners = _corners(view) - view.position
+    depths = corners @ view.backward
+    across = corners - depths[:, None] * view.backward
+    centre = across.mean(axis=0)
+    half_width = float(np.linalg.norm(across - centre, axis=1).max())
+    # Distances from the eye bound depths along the view.
+    reach = float(np.linalg.norm(across, axis=1).max())
+    least = math.sqrt(max(nearest * nearest - reach * reach, 0.0))
+    needed = math.hypot(half_width, 0.5 * (farthest - least)) / _REACH
+    size = scene * 2.0 ** math.ceil(math.log2(needed / scene))
+    if size >= scene:
+        return ALL_DISTANCES
+    centre = view.position + centre - 0.5 * (least + farthest) * view.backward
+    return ViewWindow(ShadowWindow(_on_grid(centre, middle, _GRID * size), size), math.inf, 0.0)
+
+
+def _corners(view: View) -> Float64:
+    """(4, 3) points that show in the picture's corners, m from the local origin."""
     corners = np.array([[x, y, 0.0, 1.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     points = np.linalg.solve(view.clip_from_local, corners.T).T
-    rays = points[:, :3] / points[:, 3:] - view.position
+    return points[:, :3] / points[:, 3:]
+
+
+def _cone(view: View) -> tuple[Float64, float]:
+    """Axis, unit, and cosine of half the angle of the cone around a perspective view."""
+    rays = _corners(view) - view.position
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     axis = rays.sum(axis=0)
     axis = axis / np.linalg.norm(axis)

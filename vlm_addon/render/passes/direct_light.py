@@ -12,7 +12,7 @@ from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS, LAMP
 from ..shader_library import ShaderLibrary, set_uniforms
-from ..shadow_windows import ALL_DISTANCES, FADE, view_windows
+from ..shadow_windows import ALL_DISTANCES, FADE, ViewWindow, view_windows
 from ..view import View
 from .distance_range import DistanceRange
 from .gbuffer import GBuffer
@@ -60,7 +60,7 @@ class DirectLightPass:
             "is_orthographic": view.is_orthographic,
         }
         uses_windows = [shadows.uses_windows(lamp) for lamp in range(len(shadows.lights))]
-        windows = (ALL_DISTANCES,)
+        windows: tuple[ViewWindow, ...] = (ALL_DISTANCES,)
         if any(uses_windows):
             windows = view_windows(view, *shadows.bounds, *self._distances.measure(gbuffer, view))
         for lamp in range(len(shadows.lights)):
