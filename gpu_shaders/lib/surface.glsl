@@ -25,4 +25,14 @@ vec3 mapped_normal(vec3 normal, vec4 tangent, vec3 texel, float strength, vec3 o
     }
     return unit_or(unit_normal + (unit_or(mapped, unit_normal) - unit_normal) * max(strength, 0.0), unit_normal);
 }
+
+// Where a ray meets a triangle, m. towards: per m of depth; interpolated: what the rasteriser makes of the corners,
+// off by float32's share of the farthest one's distance `reach`. Where that is far beyond the point, the triangle's
+// plane, `offset` along the normal from the origin, says better.
+vec3 seen_point(vec3 interpolated, vec3 from, vec3 towards, vec3 normal, float offset, float reach) {
+    float height = dot(normal, from);
+    float slope = dot(normal, towards);
+    bool plane_is_better = abs(offset) + abs(height) < reach * abs(slope);
+    return plane_is_better ? from + towards * ((offset - height) / slope) : interpolated;
+}
 #endif

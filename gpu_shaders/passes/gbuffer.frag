@@ -18,6 +18,8 @@ uniform vec3 camera_position;   // m, from the local origin
 uniform vec3 camera_backward;   // unit
 uniform bool is_orthographic;
 uniform vec2 clip_distances;    // m, near and far
+uniform vec3 ray;               // per m of depth, through the window's corner; 0 for an orthographic camera
+uniform vec3 ray_right, ray_up; // what each pixel to the right and up adds to it
 uniform uint sample_index;
 
 in vec3 position;
@@ -27,6 +29,7 @@ in vec3 corner_color;
 in vec4 corner_tangent;
 flat in vec3 triangle_normal;
 flat in ivec3 triangle_ids;
+flat in vec2 triangle_plane;
 
 layout(location = 0) out vec4 out_position;
 layout(location = 1) out vec4 out_shading_normal;
@@ -70,15 +73,18 @@ void main() {
         normal = mapped_normal(corner_normal, corner_tangent, texel, material.normal_strength, triangle_normal);
     }
 
+    vec3 towards = ray + gl_FragCoord.x * ray_right + gl_FragCoord.y * ray_up;
+    vec3 place = seen_point(position, camera_position, towards, triangle_normal, triangle_plane.x, triangle_plane.y);
+
     // Both normals turn to the viewer's side, as Cycles turns them on back faces.
-    vec3 to_camera = is_orthographic ? camera_backward : camera_position - position;
+    vec3 to_camera = is_orthographic ? camera_backward : camera_position - place;
     float side = dot(triangle_normal, to_camera) < 0.0 ? -1.0 : 1.0;
     int model = has_bit(material.flags, MATERIAL_PRINCIPLED) ? MODEL_PRINCIPLED : MODEL_DIFFUSE;
-    float depth = dot(camera_position - position, camera_backward);
+    float depth = dot(camera_position - place, camera_backward);
 
     gl_FragDepth =
         is_orthographic ? gl_FragCoord.z : balanced_depth(gl_FragCoord.w, clip_distances.x, clip_distances.y);
-    out_position = vec4(position, depth);
+    out_position = vec4(place, depth);
     out_shading_normal = vec4(side * normal, clamp(roughness, 0.0, 1.0));
     out_geometric_normal = vec4(side * triangle_normal, clamp(metallic, 0.0, 1.0));
     out_base_color = vec4(max(base_color, 0.0), material.specular_ior_level);

@@ -23,6 +23,7 @@ out vec3 corner_color;      // linear Rec.709
 out vec4 corner_tangent;    // xyz, w the bitangent's sign
 flat out vec3 triangle_normal;
 flat out ivec3 triangle_ids; // material, tag id, face id
+flat out vec2 triangle_plane; // plane offset, reach
 
 void main() {
     Triangle triangle = triangles[gl_VertexID / 3];
@@ -38,6 +39,7 @@ void main() {
     corner_tangent = in_tangent;
 #endif
     triangle_normal = triangle.geometric_normal;
+    triangle_plane = vec2(triangle.plane_offset, triangle.reach);
     triangle_ids = ivec3(triangle.material, triangle.tag_id, triangle.face_id);
     gl_Position = clip_from_local * vec4(in_position, 1.0);
 }

@@ -96,6 +96,18 @@ def test_positions_lie_where_the_pixels_rays_meet_the_plane(
     assert images["position"][..., 3] == pytest.approx(depth, abs=2e-4)
 
 
+def test_positions_on_a_kilometre_of_floor_are_good_to_the_distance_from_the_eye(device: Device) -> None:
+    """The rasteriser interpolates between corners a kilometre apart, which alone is off by some 0.05 mm."""
+    floor = quad((-512, -512, 0), (1024, 0, 0), (0, 1024, 0))
+    camera = camera_at((0.028, -0.05, 0.03), (0.0, 0.0, 0.003), clip_start=0.002, clip_end=2048.0)
+    images = surfaces(device, scene([floor], camera))
+    origins, directions = pixel_rays(camera, (WIDTH, HEIGHT))
+    distance = -origins[..., 2:] / directions[..., 2:]
+    error = np.linalg.norm(images["world"] - (origins + distance * directions), axis=2)
+    assert images["shown"].all()
+    assert (error <= 1e-6 * distance[..., 0]).all()
+
+
 def test_a_scene_ten_kilometres_away_gives_the_same_pictures(device: Device) -> None:
     offset = np.array([8192.0, -8192.0, 4096.0])
     near, far = surfaces(device, box_room()), surfaces(device, box_room(offset))

@@ -101,3 +101,43 @@ def test_has_bit(device: Device) -> None:
     for bit in (0, 1, 9, 31):
         found = evaluate(device, FILE, f"has_bit(uint(flags), 1u << {bit}u) ? 1.0 : 0.0", {"flags": flags})
         assert found.tolist() == [float(int(flag) >> bit & 1) for flag in flags]
+
+
+SEEN = "seen_point(p, from, towards, n, offset, reach)"
+
+
+def ray_cases(reach: float) -> dict[str, np.ndarray]:
+    """Rays onto planes near the origin, from points around it; p: a millimetre off what they meet."""
+    random = np.random.default_rng(9)
+    normal = unit(random.normal(size=(COUNT, 3)))
+    start = random.normal(size=(COUNT, 3))
+    target = random.normal(size=(COUNT, 3))
+    return {
+        "p": target + 1e-3,
+        "from": start,
+        "towards": target - start,
+        "n": normal,
+        "offset": (normal * target).sum(axis=1),
+        "reach": np.full(COUNT, reach),
+        "target": target,
+    }
+
+
+def test_seen_point_of_a_large_triangle_lies_on_its_plane_and_the_ray(device: Device) -> None:
+    inputs = ray_cases(1e3)
+    found = evaluate(device, FILE, SEEN, inputs, 3)
+    slope = np.abs((inputs["n"] * inputs["towards"]).sum(axis=1))
+    clear = slope > 0.05
+    np.testing.assert_allclose(found[clear], inputs["target"][clear], atol=2e-5)
+
+
+@pytest.mark.parametrize("problem", ["a small triangle", "no ray", "along the plane"])
+def test_seen_point_is_the_interpolated_one_where_the_plane_does_not_help(device: Device, problem: str) -> None:
+    inputs = ray_cases(1e-3 if problem == "a small triangle" else 1e3)
+    if problem == "no ray":
+        inputs["towards"] = np.zeros((COUNT, 3))
+    elif problem == "along the plane":
+        inputs["towards"] = np.tile([1.0, 0.0, 0.0], (COUNT, 1))
+        inputs["n"] = np.tile([0.0, 0.0, 1.0], (COUNT, 1))
+    found = evaluate(device, FILE, SEEN, inputs, 3)
+    assert (found == inputs["p"].astype(np.float32)).all()

@@ -64,7 +64,7 @@ class GpuGeometry:
         self.triangle_count = sum(len(mesh.triangles) for mesh in meshes)
         order = self._make_batches(meshes)
         self._buffers = self._upload_vertices(meshes, order)
-        self._triangles = self._storage_buffer(_triangle_records(meshes, order).tobytes(), "triangles")
+        self._triangles = self._storage_buffer(_triangle_records(meshes, order, self.origin).tobytes(), "triangles")
         self._material_buffer = self._storage_buffer(_material_records(self._materials).tobytes(), "materials")
         self._textures = [_upload_texture(context, texture) for texture in snapshot.textures]
         self._white = context.texture((1, 1), 4, np.ones(4, np.float32).tobytes(), dtype="f4")
@@ -199,12 +199,16 @@ def _filled_colors(mesh: Mesh) -> Float32:
     return np.ones((len(mesh.triangles), 3, 3), np.float32)
 
 
-def _triangle_records(meshes: Sequence[Mesh], order: np.ndarray) -> np.ndarray:
+def _triangle_records(meshes: Sequence[Mesh], order: np.ndarray, origin: Float64) -> np.ndarray:
     records = TRIANGLE.zeros(sum(len(mesh.triangles) for mesh in meshes))
     start = 0
     for mesh in meshes:
         part = records[start : start + len(mesh.triangles)]
-        part["geometric_normal"] = _geometric_normals(mesh)
+        normals = _geometric_normals(mesh)
+        corners = (mesh.positions - origin)[mesh.triangles]
+        part["geometric_normal"] = normals
+        part["plane_offset"] = np.einsum("ij,ij->i", normals, corners[:, 0])
+        part["reach"] = np.linalg.norm(corners, axis=2).max(axis=1)
         part["material"] = mesh.material_indices
         part["tag_id"] = mesh.tag_ids
         start += len(mesh.triangles)

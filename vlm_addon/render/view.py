@@ -19,7 +19,9 @@ class View:
 
     clip_from_local: (4, 4) float64. position: (3,) float64, m from the local origin. backward: (3,) float64, unit,
     against the direction of view. is_orthographic: whether all rays run along -backward. clip_distances: nearest and
-    farthest depth that shows.
+    farthest depth that shows. rays: (3, 3) float64, of a perspective camera: what leads to depth 1 through the
+    window's lower left corner, and by how much that differs for each pixel to the right and up; 0 for an orthographic
+    one.
     """
 
     clip_from_local: Float64
@@ -27,6 +29,7 @@ class View:
     backward: Float64
     is_orthographic: bool
     clip_distances: tuple[float, float]
+    rays: Float64
 
 
 def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: tuple[float, float] = CENTRED) -> View:
@@ -46,8 +49,18 @@ def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: 
     view_from_local = np.eye(4)
     view_from_local[:3, :3] = rotation.T
     view_from_local[:3, 3] = -rotation.T @ position
-    clip_distances = (camera.clip_start, camera.clip_end)
-    return View(clip_from_view @ view_from_local, position, rotation[:, 2].copy(), is_orthographic, clip_distances)
+    backward = rotation[:, 2].copy()
+    window = np.array([[frame[0], frame[2]], [(right - left) / width, 0.0], [0.0, (top - bottom) / height]])
+    rays = window @ rotation[:, :2].T
+    rays[0] -= backward
+    return View(
+        clip_from_local=clip_from_view @ view_from_local,
+        position=position,
+        backward=backward,
+        is_orthographic=is_orthographic,
+        clip_distances=(camera.clip_start, camera.clip_end),
+        rays=np.zeros((3, 3)) if is_orthographic else rays,
+    )
 
 
 def _projection(frame: tuple[float, float, float, float], near: float, far: float, is_orthographic: bool) -> Float64:

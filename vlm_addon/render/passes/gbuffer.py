@@ -76,6 +76,9 @@ class GBufferPass:
                 "camera_backward": view.backward,
                 "is_orthographic": view.is_orthographic,
                 "clip_distances": view.clip_distances,
+                "ray": view.rays[0],
+                "ray_right": view.rays[1],
+                "ray_up": view.rays[2],
                 "sample_index": sample_index,
             },
         )
