@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of light grids: everything comes back, and nothing but a whole file is read."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.light_meshes import random_lights
+from vlm_addon.core import light_grid_file
+from vlm_addon.core.array_codec import content_hash
+from vlm_addon.core.errors import InvalidInput
+from vlm_addon.core.light_grid import GridSettings, LightGrid
+from vlm_addon.core.light_grid_file import MAGIC, load_light_grid, save_light_grid
+
+BOX = ((-2.0, -2.0, -1.0), (2.0, 3.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def grid():
+    return LightGrid.bake(random_lights(0, 12), BOX, GridSettings(3, 2.0, 4))
+
+
+@pytest.fixture(scope="module")
+def whole(grid, tmp_path_factory):
+    path = tmp_path_factory.mktemp("grids") / "whole.vlmgrid"
+    save_light_grid(grid, path)
+    return path.read_bytes()
+
+
+def refused(path, data):
+    path.write_bytes(data)
+    with pytest.raises(InvalidInput) as caught:
+        load_light_grid(path)
+    assert caught.value.subject == str(path)
+    assert caught.value.problem
+    assert caught.value.remedy
+    return caught.value.problem
+
+
+def test_everything_comes_back(grid, tmp_path):
+    save_light_grid(grid, tmp_path / "a.vlmgrid")
+    loaded = load_light_grid(tmp_path / "a.vlmgrid")
+    assert content_hash(loaded) == content_hash(grid)
+    assert loaded.nbytes == grid.nbytes
+    points = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 3))
+    for expected, found in zip(grid.candidates(points), loaded.candidates(points), strict=True):
+        assert expected.tolist() == found.tolist()
+
+
+def test_the_same_grid_gives_the_same_bytes(grid, whole, tmp_path):
+    save_light_grid(grid, tmp_path / "a.vlmgrid")
+    assert (tmp_path / "a.vlmgrid").read_bytes() == whole
+
+
+def test_every_truncation_is_refused(whole, tmp_path):
+    for length in range(len(whole)):
+        refused(tmp_path / "cut.vlmgrid", whole[:length])
+
+
+def test_every_flipped_bit_of_the_header_is_refused(whole, tmp_path):
+    for bit in range(8 * 60):
+        data = bytearray(whole)
+        data[bit // 8] ^= 1 << bit % 8
+        refused(tmp_path / "flipped.vlmgrid", bytes(data))
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_flipped_bits_and_changed_lengths_are_refused(whole, tmp_path, data):
+    changed = bytearray(whole)
+    for bit in data.draw(st.sets(st.integers(0, 8 * len(whole) - 1), min_size=1, max_size=4)):
+        changed[bit // 8] ^= 1 << bit % 8
+    refused(tmp_path / "flipped.vlmgrid", bytes(changed))
+    extra = data.draw(st.binary(min_size=1, max_size=20))
+    refused(tmp_path / "longer.vlmgrid", whole + extra)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=200).filter(lambda data: not data.startswith(MAGIC)))
+def test_foreign_files_are_refused(tmp_path, data):
+    assert "not a light grid" in refused(tmp_path / "foreign.vlmgrid", data)
+
+
+def test_other_versions_say_so(whole, tmp_path):
+    newer = whole[:8] + (2).to_bytes(4, "little") + whole[12:]
+    assert "version 2" in refused(tmp_path / "newer.vlmgrid", newer)
+
+
+def test_missing_files_and_folders_are_refused(grid, tmp_path):
+    for path in (tmp_path / "none.vlmgrid", tmp_path):
+        with pytest.raises(InvalidInput, match="cannot be read"):
+            load_light_grid(path)
+    for path in (tmp_path / "none" / "a.vlmgrid", tmp_path):
+        with pytest.raises(InvalidInput, match="cannot be written"):
+            save_light_grid(grid, path)
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(grid, whole, tmp_path, monkeypatch):
+    path = tmp_path / "a.vlmgrid"
+    path.write_bytes(whole)
+
+    def fail(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(light_grid_file.os, "fsync", fail)
+    with pytest.raises(InvalidInput, match="No space left"):
+        save_light_grid(grid, path)
+    assert path.read_bytes() == whole
+    assert [item.name for item in tmp_path.iterdir()] == ["a.vlmgrid"]

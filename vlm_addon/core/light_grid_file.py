@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light grids in files: a magic word, a version, the length and the SHA-256 of what follows, a JSON tree, the arrays.
+
+A file is written whole or not at all and read whole or refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import struct
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .active_hemisphere import HalfBalls
+from .array_codec import flatten, unflatten
+from .cell_limit import Occupancy
+from .cell_lists import CellLists
+from .errors import InvalidInput
+from .light_grid import GridFrame, GridSettings, LightGrid
+
+MAGIC = b"VLMGRID\n"
+VERSION = 1
+# Magic word, version, length of the body, SHA-256 of all these and of the body.
+_HEADER = struct.Struct("<8sIQ32s")
+_TREE_LENGTH = struct.Struct("<Q")
+_ALIGNMENT = 8
+_READ_REMEDY = "bake the grid again, or give a whole file"
+
+
+def save_light_grid(grid: LightGrid, path: Path | str) -> None:
+    """Writes `grid` as `path`, which appears whole or not at all. Raises InvalidInput where nothing can be written."""
+    path = Path(path).absolute()
+    tree, arrays = flatten(grid)
+    described = {"tree": tree, "arrays": [{"dtype": array.dtype.str, "shape": array.shape} for array in arrays]}
+    text = json.dumps(described).encode()
+    text += b" " * (-len(text) % _ALIGNMENT)
+    body = [_TREE_LENGTH.pack(len(text)), text]
+    for array in arrays:
+        body += [array.tobytes(), bytes(-array.nbytes % _ALIGNMENT)]
+    length = sum(len(part) for part in body)
+    header = _HEADER.pack(MAGIC, VERSION, length, _digest(VERSION, body))
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    try:
+        with open(handle, "wb") as file:
+            file.writelines([header, *body])
+            file.flush()
+            os.fsync(file.fileno())
+        # mkstemp makes private files; what a program writes for its user is as the user's mask says.
+        Path(name).chmod(0o666 & ~_umask())
+        os.replace(name, path)
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(name)
+
+
+def load_light_grid(path: Path | str) -> LightGrid:
+    """The grid that `save_light_grid` wrote.
+
+    Raises InvalidInput, one sentence, for a file that is missing, of another kind or version, cut short or damaged.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InvalidInput(str(path), f"it cannot be read ({error.strerror})", "give a light grid's file") from error
+    if not data.startswith(MAGIC):
+        raise InvalidInput(str(path), "it is not a light grid", "give a file that bake wrote")
+    if len(data) < _HEADER.size:
+        raise InvalidInput(str(path), "it is cut short", _READ_REMEDY)
+    _, version, length, digest = _HEADER.unpack_from(data)
+    body = memoryview(data)[_HEADER.size :]
+    if version != VERSION:
+        problem = f"it is a light grid of version {version}, this program reads version {VERSION}"
+        raise InvalidInput(str(path), problem, "bake the grid again")
+    if len(body) != length:
+        problem = f"it holds {len(body):,} bytes of {length:,}"
+        raise InvalidInput(str(path), problem, _READ_REMEDY)
+    if _digest(version, [body]) != digest:
+        raise InvalidInput(str(path), "it is damaged (its checksum does not match)", _READ_REMEDY)
+    return _grid(body)
+
+
+def _grid(body: memoryview) -> LightGrid:
+    """The grid of a body whose checksum holds, so that what it says can be trusted."""
+    (text_length,) = _TREE_LENGTH.unpack_from(body)
+    start = _TREE_LENGTH.size
+    described = json.loads(bytes(body[start : start + text_length]))
+    start += text_length
+    arrays: list[np.ndarray] = []
+    for entry in described["arrays"]:
+        dtype, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
+        count = int(np.prod(shape, dtype=np.int64))
+        arrays.append(np.frombuffer(body, dtype, count, start).reshape(shape))
+        size = count * dtype.itemsize
+        start += size + -size % _ALIGNMENT
+    values: dict[str, Any] = unflatten(described["tree"], arrays)
+    return LightGrid(
+        settings=GridSettings(**values["settings"]),
+        frame=GridFrame(**values["frame"]),
+        half_balls=HalfBalls(**values["half_balls"]),
+        lists=CellLists(**values["lists"]),
+        occupancy=Occupancy(**values["occupancy"]),
+        light_hash=values["light_hash"],
+    )
+
+
+def _digest(version: int, body: list[Any]) -> bytes:
+    digest = hashlib.sha256(MAGIC + struct.pack("<I", version))
+    for part in body:
+        digest.update(part)
+    return digest.digest()
+
+
+def _cannot_write(path: Path, error: OSError) -> InvalidInput:
+    return InvalidInput(str(path), f"it cannot be written ({error.strerror})", "give a path that can be written")
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
