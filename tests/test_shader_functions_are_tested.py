@@ -29,17 +29,7 @@ def test_text():
     return "\n".join(path.read_text() for path in sorted(RENDER_TESTS.glob("test_*.py")))
 
 
-TESTED_THROUGH_PASSES = ("lights", "shadow")
-LIBRARY_FILES = [
-    pytest.param(
-        path,
-        id=path.stem,
-        marks=pytest.mark.xfail(strict=True, reason="tested through passes so far")
-        if path.stem in TESTED_THROUGH_PASSES
-        else (),
-    )
-    for path in sorted(LIBRARY.glob("*.glsl"))
-]
+LIBRARY_FILES = [pytest.param(path, id=path.stem) for path in sorted(LIBRARY.glob("*.glsl"))]
 
 
 @pytest.mark.parametrize("path", LIBRARY_FILES)

@@ -7,6 +7,8 @@
 
 // From this many radii on a cell of an area lamp is a point: the square of its inverse is the error.
 #define AREA_LAMP_FAR 64.0
+// W/m²: what a point lamp brings to a surface that touches it is unbounded, but float32 and the sums after it are not.
+#define MOST_IRRADIANCE 1e30
 
 // What reaches a point from one sample of a lamp.
 struct LampRay {
@@ -82,28 +84,30 @@ void add_clipped_edge(vec3 a, vec3 b, vec3 n, inout float sum, inout vec3 exit_p
     sum += edge_irradiance(b, a, n);
 }
 
-// Share of the hemisphere over p with normal n that an area lamp's cell fills, cosine-weighted.
+// Share of the hemisphere over p with normal n that an area lamp's cell fills, cosine-weighted. In units of about the
+// cell's size, as in triangle_form_factor.
 float cell_form_factor(Lamp lamp, vec3 p, vec3 n) {
-    vec3 to_cell = lamp_corner(lamp, lamp.cell_centre) - p;
+    float scale = unit_scale(lamp.cell_radius);
+    vec3 to_cell = (lamp_corner(lamp, lamp.cell_centre) - p) * scale;
     float distance_squared = dot(to_cell, to_cell);
-    float plane_distance = dot(lamp.z_axis, to_cell);
-    if (plane_distance <= 0.0) {
+    if (lamp.cell_area <= 0.0 || dot(lamp.z_axis, to_cell) <= 0.0) {
         return 0.0;
     }
-    float far = AREA_LAMP_FAR * lamp.cell_radius;
+    float far = AREA_LAMP_FAR * scale * lamp.cell_radius;
     if (distance_squared > far * far) {
-        float scale = lamp.cell_area / (FORM_FACTOR_PI * distance_squared * distance_squared);
-        return max(dot(n, to_cell), 0.0) * plane_distance * scale;
+        vec3 direction = normalize(to_cell);
+        float facing = max(dot(n, direction), 0.0) * dot(lamp.z_axis, direction);
+        return facing * (lamp.cell_area * scale * scale) / (FORM_FACTOR_PI * distance_squared);
     }
     vec2 corners[8] = vec2[8](
         lamp.corners_01.xy, lamp.corners_01.zw, lamp.corners_23.xy, lamp.corners_23.zw,
         lamp.corners_45.xy, lamp.corners_45.zw, lamp.corners_67.xy, lamp.corners_67.zw
     );
     vec3 exit_point = vec3(0.0), entry_point = vec3(0.0);
-    vec3 start = lamp_corner(lamp, corners[lamp.corner_count - 1]) - p;
+    vec3 start = (lamp_corner(lamp, corners[lamp.corner_count - 1]) - p) * scale;
     float sum = 0.0;
     for (int i = 0; i < lamp.corner_count; ++i) {
-        vec3 end = lamp_corner(lamp, corners[i]) - p;
+        vec3 end = (lamp_corner(lamp, corners[i]) - p) * scale;
         add_clipped_edge(start, end, n, sum, exit_point, entry_point);
         start = end;
     }
@@ -132,7 +136,8 @@ LampRay lamp_ray(Lamp lamp, vec3 p) {
     float radius_squared = lamp.radius * lamp.radius;
     float reach = max(max(dot(to_centre, to_centre) + lamp.falloff_radius_squared, radius_squared), 1e-30);
     float attenuation = lamp.kind == LAMP_SPOT ? spot_attenuation(lamp, -direction) : 1.0;
-    return LampRay(direction, lamp.intensity * (attenuation / reach), disk * radius_squared / reach);
+    vec3 irradiance = min(lamp.intensity * (attenuation / reach), MOST_IRRADIANCE);
+    return LampRay(direction, irradiance, disk * radius_squared / reach);
 }
 
 // Irradiance in W/m² at p with unit normal n, without shadows; averaged over the samples of a lamp it is exact.
@@ -152,6 +157,6 @@ vec3 lamp_irradiance(Lamp lamp, vec3 p, vec3 n) {
     if (lamp.kind == LAMP_SPOT) {
         facing *= spot_attenuation(lamp, p - lamp.sample_position);
     }
-    return lamp.intensity * facing;
+    return min(lamp.intensity * facing, MOST_IRRADIANCE);
 }
 #endif

@@ -60,6 +60,9 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     // Depth grows with the tangent of the angle of incidence, its change with the square of one over the cosine.
     float steepness = 1.0 / max(cos_lamp * cos_lamp, 1e-4);
     ShadowPoint receiver = shadow_point(lamp, p, n);
+    if (!parallel && receiver.position.z <= 0.0) {
+        return 0.0; // at the lamp, or behind a spot
+    }
     vec2 tiles = lamp.shadow_kind == SHADOW_CUBE ? vec2(SHADOW_CUBE_COLUMNS, SHADOW_CUBE_ROWS) : vec2(1.0);
     vec2 map_size = vec2(textureSize(map, 0));
     vec2 resolution = map_size / tiles;
@@ -85,7 +88,7 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
         rounding = lamp.shadow_rounding / (max(texel.x, texel.y) * q.z);
     }
     rounding *= steepness;
-    float leaning = tilt * steepness + rounding;
+    float leaning = max(tilt, SHADOW_ON_PLANE) * steepness + rounding;
     vec2 place = (uv / lamp.shadow_extent * 0.5 + 0.5) * resolution;
     vec2 corner = clamp(floor(place - 0.5), vec2(0.0), resolution - 2.0);
     vec2 fraction = clamp(place - 0.5 - corner, 0.0, 1.0);

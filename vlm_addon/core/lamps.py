@@ -25,10 +25,15 @@ from .form_factor import polygon_form_factor
 from .scene import AREA, ELLIPSE, SPOT, SUN, Float64, Light
 
 NARROW_CONE = 0.03
-"""Sine of half a cone of directions below which it is as flat as a disk."""
+"""Sine of half a cone of directions below which float32 takes its base for a flat disk: 6e-5 of the sine at most."""
 LEAST_BLEND = 1e-4
 """Of 1 - cosine of half a spot's cone: its edge is never sharper."""
 
+LEAST_SPOT_SCALE = 1e-6
+"""A spot's cone is never squashed further."""
+
+# The same for float64: there the exact form has lost as much, 1e-7 of the sine.
+_FLAT_CONE = 1e-3
 _ELLIPSE_CELLS = 64
 _CELL_CORNERS = 8
 # Steps of the bisection that inverts the radius of a lamp's ball: one for each bit of a float64.
@@ -199,8 +204,8 @@ def _ball_points(count: int) -> Float64:
 def spot_attenuation(light: Light, directions: Float64) -> Float64:
     """(n,) factor on a SPOT's intensity along unit `directions` (n, 3) that leave the lamp."""
     local = directions @ np.array([light.x_axis, light.y_axis, light.z_axis]).T
-    local = local / np.array([*light.spot_scale, 1.0])
-    cosine = -local[:, 2] / np.linalg.norm(local, axis=1)
+    local = local / np.array([*np.maximum(light.spot_scale, LEAST_SPOT_SCALE), 1.0])
+    cosine = -local[:, 2] / np.maximum(np.linalg.norm(local, axis=1), 1e-300)
     cos_half = math.cos(0.5 * light.spot_angle)
     t = np.clip((cosine - cos_half) / max((1.0 - cos_half) * light.spot_blend, LEAST_BLEND), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
@@ -223,17 +228,20 @@ def horizon_cosine(cosine: Float64, sine: Float64) -> Float64:
     # For narrow cones the terms above cancel; the cone's base is then a flat disk.
     t = c / s
     flat = s * (t * np.arccos(-t) + np.sqrt(np.maximum(1.0 - t * t, 0.0)) * (2.0 + t * t) / 3.0) / np.pi
-    partly = np.where(s < NARROW_CONE, flat, exact)
+    partly = np.where(s < _FLAT_CONE, flat, exact)
     return np.where(cosine >= sine, cosine, np.where(cosine <= -sine, 0.0, partly))
 
 
 def lamp_irradiance(light: Light, points: Float64, normals: Float64) -> Float64:
     """(n, 3) float64 irradiance in W/m² from all of `light` without occluders; 0 for the part below the horizon.
 
-    points, normals: (n, 3), m in world space and unit. The cone of a SPOT is measured from its centre.
+    points, normals: (n, 3), m in world space and unit. The cone of a SPOT is measured from its centre. An AREA lamp
+    without area sends nothing, as in Cycles.
     """
     power = np.array(light.power, np.float64)
     if light.kind == AREA:
+        if not area_of(light) > 0.0:
+            return np.zeros((len(points), 3))
         factors = polygon_form_factor(points, normals, area_polygons(light)).sum(axis=1)
         return factors[:, None] * power / area_of(light)
     if light.kind == SUN:

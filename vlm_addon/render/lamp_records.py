@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..core.lamps import LEAST_BLEND, LampSample, area_of
+from ..core.lamps import LEAST_BLEND, LEAST_SPOT_SCALE, LampSample, area_of
 from ..core.scene import AREA, POINT, SPOT, SUN, Float64, Light
 from .gpu_layout import CONSTANTS, LAMP
 
@@ -33,13 +33,14 @@ def lamp_record(light: Light, sample: LampSample, origin: Float64) -> np.ndarray
         cos_half = math.cos(0.5 * light.spot_angle)
         record["spot_cos_half"] = cos_half
         record["spot_sharpness"] = 1.0 / max((1.0 - cos_half) * light.spot_blend, LEAST_BLEND)
-        record["spot_scale"] = light.spot_scale
+        record["spot_scale"] = np.maximum(light.spot_scale, LEAST_SPOT_SCALE)
     if light.kind == SUN:
         record["intensity"] = power
         record["radius"] = math.sin(0.5 * light.angle)
         _set_axes(record, sample.position)
     if light.kind == AREA:
-        record["intensity"] = power / (area_of(light) * sample.share)
+        area = area_of(light) * sample.share
+        record["intensity"] = power / area if area > 0.0 else 0.0
         _set_cell(record, sample.cell)
     return record
 

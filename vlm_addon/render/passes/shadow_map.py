@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 VERTEX, FRAGMENT = "passes/shadow_map.vert", "passes/shadow_map.frag"
 # Above this cone one perspective map wastes most of its texels on the rim.
 WIDEST_CONE = math.radians(120.0)
+NARROWEST_CONE = 1e-6
+"""Tangent of half the angle of a map; a spot without a cone shines nowhere."""
 # Faces of a cube: index of the axis that looks forward, its sign. The other two axes follow cyclically.
 CUBE_FACES = ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0))
 FRONT_FACE = 5
@@ -179,6 +181,7 @@ class ShadowMapPass:
         record["shadow_near"] = near
         if shadow_kind(light) == "SHADOW_CONE":
             tangents = math.tan(0.5 * light.spot_angle) * np.array(light.spot_scale) / (1.0 - 2.0 * MARGIN / width)
+            tangents = np.maximum(tangents, NARROWEST_CONE)
             record["shadow_extent"] = tangents
             return [(_perspective(axes, FRONT_FACE, tangents, near), (0, 0, width, height))]
         side = self._face(light)
