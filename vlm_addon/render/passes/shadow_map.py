@@ -40,7 +40,7 @@ MARGIN = 2.0
 # Nearest occluder that counts, of the distance to the farthest: no precision depends on it.
 NEAREST = 1e-6
 # Rounding of a vertex and of its interpolation, of half the scene's diagonal.
-ROUNDING = 2.0**-22
+ROUNDING = 2.0**-23
 # Height of what a sun's map does not show, m.
 EMPTY_HEIGHT = -1e30
 # Bytes of maps that are kept for all samples of a frame; further lamps are drawn again.
