@@ -13,23 +13,20 @@
 // faces the point squarely 1e-3 / distance³ or 3e-7, whichever is more. The edges, which cancel, lose as much there.
 #define FORM_FACTOR_FAR 16.0
 
-// 2 atan(sqrt u) / sqrt u for u in [0, 1], relative error 1e-7.
+// 2 atan(sqrt u) / sqrt u for u in [0, 1], relative error 1e-7; in halves that do not wait for each other.
 float double_arctangent_ratio(float u) {
-    float sum = -0.00469328;
-    sum = sum * u + 0.02425240;
-    sum = sum * u - 0.05948639;
-    sum = sum * u + 0.09914293;
-    sum = sum * u - 0.14019481;
-    sum = sum * u + 0.19969724;
-    sum = sum * u - 0.33331991;
-    return 2.0 * (sum * u + 0.9999999);
+    float v = u * u;
+    float low = (1.9999998 - 0.66663982 * u) + (0.39939448 - 0.28038962 * u) * v;
+    float high = (0.19828586 - 0.11897278 * u) + (0.04850480 - 0.00938656 * u) * v;
+    return low + high * (v * v);
 }
 
 // Direction of a x b, its length the tangent of half the angle between a and b or, where cosine = a b < 0, of half
 // what is left to a half turn. From the span, which loses nothing where a and b almost agree, and the shorter of them,
 // which loses nothing where one almost touches the point.
 vec3 half_angle_normal(vec3 a, vec3 b, float a_length, float b_length, float cosine) {
-    return cross(a_length < b_length ? a : b, b - a) / max(a_length * b_length + abs(cosine), 1e-37);
+    // One division, not one for each component.
+    return cross(a_length < b_length ? a : b, b - a) * (1.0 / max(a_length * b_length + abs(cosine), 1e-37));
 }
 
 // Angle at the point between a and b, times the cosine between n and the plane through both: one edge's share of
@@ -38,7 +35,7 @@ vec3 half_angle_normal(vec3 a, vec3 b, float a_length, float b_length, float cos
 float edge_irradiance(vec3 a, vec3 b, float a_length, float b_length, float cosine, vec3 n) {
     vec3 s = half_angle_normal(a, b, a_length, b_length, cosine);
     float u = dot(s, s);
-    float acute = double_arctangent_ratio(min(u, 1.0));
+    float acute = double_arctangent_ratio(u);
     float obtuse = FORM_FACTOR_PI * inversesqrt(max(u, 1e-37)) - acute;
     return (cosine >= 0.0 ? acute : obtuse) * dot(n, s);
 }
@@ -47,11 +44,12 @@ float edge_irradiance(vec3 a, vec3 b, vec3 n) {
     return edge_irradiance(a, b, length(a), length(b), dot(a, b), n);
 }
 
-// Angle between a and b in [0, pi]: the arc along the horizon. Lies on the rim of the cosine-weighted disk, so it
-// always adds.
-float horizon_arc(vec3 a, vec3 b) {
+// Angle along the horizon from a, where the outline goes under, to b, where it comes up. On the rim of the
+// cosine-weighted disk, so the whole of it counts; but only what of it lies along the horizon, and with its sign, or
+// the rounding of a and b would lend a sliver an arc that its edges do not take back.
+float horizon_arc(vec3 a, vec3 b, vec3 n) {
     float cosine = dot(a, b);
-    float t = min(length(half_angle_normal(a, b, length(a), length(b), cosine)), 1.0);
+    float t = dot(n, half_angle_normal(b, a, length(b), length(a), cosine));
     float angle = double_arctangent_ratio(t * t) * t;
     return cosine >= 0.0 ? angle : FORM_FACTOR_PI - angle;
 }
@@ -77,15 +75,14 @@ struct VisibleOutline {
 VisibleOutline visible_outline(vec3 a, vec3 b, vec3 c, vec3 heights) {
     // The corner that is alone on its side of the horizon comes first. Software renderers run every branch, so what
     // differs between the cases is chosen and the rest is shared.
-    bvec3 above = greaterThan(heights, vec3(0.0));
-    int count = int(above.x) + int(above.y) + int(above.z);
-    bool whole = count == 3, lone_above = count == 1;
-    bool second = !whole && above.y == lone_above && above.x != lone_above;
-    bool third = !whole && above.z == lone_above && above.x != lone_above;
+    bool a_above = heights.x > 0.0, b_above = heights.y > 0.0, c_above = heights.z > 0.0;
+    bool whole = a_above && b_above && c_above;
+    bool second = a_above == c_above && a_above != b_above, third = a_above == b_above && a_above != c_above;
     vec3 first = second ? b : third ? c : a;
     vec3 next = second ? c : third ? a : b;
     vec3 last = second ? a : third ? b : c;
     vec3 h = second ? heights.yzx : third ? heights.zxy : heights;
+    bool lone_above = !whole && h.x > 0.0;
     vec3 to_next = edge_at_horizon(first, next, h.x, h.y), to_last = edge_at_horizon(first, last, h.x, h.z);
     // Shares of the edges from the first corner up to the horizon.
     float share_next = whole ? 0.0 : h.x / (h.x - h.y), share_last = whole ? 0.0 : h.x / (h.x - h.z);
@@ -147,7 +144,7 @@ float triangle_form_factor(
         return far_integrand(outline, squared, products) * plane_distance_area * (1.0 / FORM_FACTOR_PI);
     }
     vec4 lengths = sqrt(squared);
-    float sum = horizon_arc(q2, q3) + edge_irradiance(q1, q0, lengths.y, lengths.x, products.x, n)
+    float sum = horizon_arc(q2, q3, n) + edge_irradiance(q1, q0, lengths.y, lengths.x, products.x, n)
         + edge_irradiance(q2, q1, lengths.z, lengths.y, products.y, n)
         + edge_irradiance(q0, q3, lengths.x, lengths.w, products.w, n);
     return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);

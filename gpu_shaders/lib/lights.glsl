@@ -112,7 +112,7 @@ float cell_form_factor(Lamp lamp, vec3 p, vec3 n) {
         start = end;
     }
     if (dot(exit_point, exit_point) > 0.0) {
-        sum += horizon_arc(exit_point, entry_point);
+        sum += horizon_arc(exit_point, entry_point, n);
     }
     return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);
 }

@@ -318,8 +318,15 @@ def test_horizon_arc(device: Device) -> None:
     angles = np.concatenate([[0.0, PI], np.linspace(1e-6, PI - 1e-6, COUNT)])
     a = np.tile([2.0, 0.0, 0.0], (len(angles), 1))
     b = single(0.3 * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1))
-    values = evaluate(device, PATH, "horizon_arc(a, b)", {"a": a, "b": b})
+    down = np.tile([0.0, 0.0, -1.0], (len(angles), 1))
+    values = evaluate(device, PATH, "horizon_arc(a, b, n)", {"a": a, "b": b, "n": down})
     np.testing.assert_allclose(values, np.arctan2(b[:, 1], b[:, 0]), atol=1e-6)
+
+
+def test_what_of_an_arc_leaves_the_horizon_does_not_count(device: Device) -> None:
+    a, b = np.array([[2.0, 0.0, 1e-6]]), np.array([[2.0, 1e-7, -1e-6]])
+    values = evaluate(device, PATH, "horizon_arc(a, b, n)", {"a": a, "b": b, "n": np.array([[0.0, 0.0, -1.0]])})
+    np.testing.assert_allclose(values, [0.5e-7], rtol=1e-5)
 
 
 def test_edge_at_horizon(device: Device) -> None:
