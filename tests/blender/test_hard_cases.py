@@ -46,10 +46,25 @@ CAMERAS = [
     "10 from above",
 ]
 # One sample a pixel, at its centre, so that a pixel's face is all that it shows.
-SMALL = RenderSettings(128, 96, "vlm", samples=1, shadow_resolution=512, shadow_samples=4, buffers=True)
-LARGE = replace(SMALL, width=320, height=240, shadow_resolution=1024, shadow_samples=16)
+SMALL = RenderSettings(128, 96, "vlm", samples=1, shadow_resolution=512, shadow_samples=1, buffers=True)
+LARGE = replace(SMALL, width=320, height=240, shadow_resolution=1024, shadow_samples=8)
 LARGE_ONLY = pytest.mark.full
 SIZES = [pytest.param(SMALL, id="small"), pytest.param(LARGE, id="large", marks=LARGE_ONLY)]
+# A virtual light's own measure of the lamps is as coarse as the points that it takes of them.
+STEADY_SIZES = [
+    pytest.param(replace(SMALL, shadow_samples=4), id="small"),
+    pytest.param(replace(LARGE, shadow_samples=16), id="large", marks=LARGE_ONLY),
+]
+SCALED = [
+    # Both scales of every camera take twice as long; the small pictures alternate.
+    pytest.param(scale, camera, settings, id=f"{scale:g}-{camera}-{name}", marks=marks)
+    for number, camera in enumerate(CAMERAS)
+    for scale_number, scale in enumerate((1e-3, 1e3))
+    for settings, name, marks in (
+        (SMALL, "small", LARGE_ONLY if (number + scale_number) % 2 else ()),
+        (LARGE, "large", LARGE_ONLY),
+    )
+]
 
 # What the techniques `direct` and `vlm` show: nothing in the scene glows.
 PICTURES = ("direct", "combined")
@@ -60,8 +75,8 @@ LARGEST_CHANGE = 0.02
 GREY = 0.18
 # A state is a share of light: equal within what the filter of a shadow map leaves over a lit surface.
 SAME_STATE = 1.0 / 64.0
-# The moves shift edges by a hundredth of a pixel.
-AT_SHADOW_EDGES = 0.005
+# The moves shift edges by a hundredth of a pixel, but a lamp that moves meets them at other texels of its map.
+AT_SHADOW_EDGES = 0.02
 # Share of the pixels that must be left to compare; the cloth's triangles are the smallest on screen.
 LEAST_COMPARED = 0.2
 
@@ -90,10 +105,12 @@ class HardCases:
 
     def picture(self, device, camera, settings):
         """Images of the scene as it is."""
-        key = (camera, settings.technique, settings.width)
-        if key not in self._kept:
-            self._kept[key] = render(device, self.seen_by(camera), self.light_mesh, settings)
-        return self._kept[key]
+        if (camera, *picture_key(settings)) not in self._kept:
+            self.keep(camera, settings, render(device, self.seen_by(camera), self.light_mesh, settings))
+        return self._kept[camera, *picture_key(settings)]
+
+    def keep(self, camera, settings, images):
+        self._kept[camera, *picture_key(settings)] = images
 
     def seen_by(self, camera):
         return replace(self.snapshot, camera=self.cameras[camera])
@@ -114,6 +131,10 @@ class HardCases:
         props = shown & ~is_scenery[faces]
         points = images["position"][props if props.any() else shown]
         return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+
+
+def picture_key(settings):
+    return settings.technique, settings.width, settings.shadow_samples
 
 
 def render(device, snapshot, light_mesh, settings):
@@ -164,21 +185,22 @@ def require_steady(before, after, states_before, states_after):
     faces = [images["face_id"] for images in (before, after)]
     same_face = (faces[0] == faces[1]).all(axis=-1)
     same_face &= (neighbourhood_spread(faces[0]) == 0) & (neighbourhood_spread(faces[1]) == 0)
-    assert same_face.mean() >= LEAST_COMPARED
     changes = {}
     for name in PICTURES:
         old, new = before[name][..., :3], after[name][..., :3]
         changes[name] = (np.abs(new - old) / np.maximum(old, old.mean())).max(axis=-1) * same_face
     largest = np.max(list(changes.values()), axis=0)
     assert (largest[same_face] > LARGEST_CHANGE).mean() <= AT_SHADOW_EDGES
-    if largest.max() <= LARGEST_CHANGE:
-        return
-    states = states_before(), states_after()
-    same_state = np.abs(states[0] - states[1]).max(axis=-1) <= SAME_STATE
-    same_state &= np.maximum(*map(neighbourhood_spread, states)) <= SAME_STATE
-    assert (same_face & same_state).mean() >= LEAST_COMPARED
+    compared, states = same_face, []
+    for find_states in (states_before, states_after):
+        if (largest * compared).max() <= LARGEST_CHANGE:
+            break
+        states.append(find_states())
+        compared = compared & (neighbourhood_spread(states[-1]) <= SAME_STATE)
+        compared &= np.abs(states[-1] - states[0]).max(axis=-1) <= SAME_STATE
+    assert compared.mean() >= LEAST_COMPARED
     for name, change in changes.items():
-        worst = change * same_state
+        worst = change * compared
         row, column = np.unravel_index(worst.argmax(), worst.shape)
         assert worst.max() <= LARGEST_CHANGE, f"{name}: {worst.max():.1%} at column {column}, row {row}"
 
@@ -206,7 +228,7 @@ def test_every_frame_buffer_is_finite_and_not_negative(device, hard_cases, camer
             if name not in ("position", "normal", "material_id", "tag_id", "face_id"):
                 assert (image >= 0.0).all(), name
         assert frame.images["combined"][..., :3].mean() > 0.0
-        hard_cases._kept[camera, technique, settings.width] = frame.images
+        hard_cases.keep(camera, chosen, frame.images)
 
 
 @pytest.mark.parametrize("settings", SIZES)
@@ -217,7 +239,7 @@ def test_both_techniques_show_the_same_direct_light(device, hard_cases, camera, 
     assert (hard_cases.picture(device, camera, settings)["direct"] == direct).all()
 
 
-@pytest.mark.parametrize("settings", SIZES)
+@pytest.mark.parametrize("settings", STEADY_SIZES)
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_a_small_move_of_the_camera_changes_little(device, hard_cases, camera, settings):
     before = hard_cases.picture(device, camera, settings)
@@ -234,7 +256,7 @@ def test_a_small_move_of_the_camera_changes_little(device, hard_cases, camera, s
     )
 
 
-@pytest.mark.parametrize("settings", SIZES)
+@pytest.mark.parametrize("settings", STEADY_SIZES)
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_a_small_move_of_the_lamps_changes_little(device, hard_cases, camera, settings):
     """All at once: each moves along a direction of its own."""
@@ -297,9 +319,7 @@ def transformed(scene, light_mesh, scale, offset):
     return replace(scene, meshes=meshes, lights=tuple(lamps), camera=camera), lights
 
 
-@pytest.mark.parametrize("settings", SIZES)
-@pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize(("scale", "camera", "settings"), SCALED)
 def test_a_scaled_scene_gives_the_same_picture(device, hard_cases, scale, camera, settings):
     expected = hard_cases.picture(device, camera, settings)
     scaled = transformed(hard_cases.seen_by(camera), hard_cases.light_mesh, scale, np.zeros(3))
