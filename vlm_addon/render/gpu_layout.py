@@ -173,8 +173,14 @@ a sun's shadow map that shows it best."""
 SOURCE_LIGHT = GpuStruct("SourceLight", (("vec3", "reflectance"), ("int", "first_sample"), ("int", "end_sample")))
 """What phase one needs of a virtual light; reflectance: colour times strength."""
 
+HALF_BALL = GpuStruct(
+    "HalfBall",
+    (("vec3", "centre"), ("float", "radius_squared"), ("vec3", "normal"), ("vec3", "inverse_normal")),
+)
+"""One of core.active_hemisphere.HalfBalls, in the grid's frame."""
+
 STRUCTS: dict[str, GpuStruct] = {
-    struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL, LAMP, SOURCE_SAMPLE, SOURCE_LIGHT)
+    struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL, LAMP, SOURCE_SAMPLE, SOURCE_LIGHT, HALF_BALL)
 }
 """What `#include "gpu_layout/Name"` finds."""
 

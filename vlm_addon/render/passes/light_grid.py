@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lists of a light grid by compute shaders: the same, bit for bit, as core/cell_lists.py makes.
+
+From large blocks of cells to small ones: a block tests the lights of the larger block that holds it. Each size counts,
+sums up the counts and writes, so nothing depends on the order in which a device does things.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.active_hemisphere import HalfBalls
+from ...core.cell_lists import CellLists
+from ...core.errors import DeviceError
+from ...core.progress import Progress, silent, step
+from ...core.scene import Float32
+from ..gpu_layout import HALF_BALL
+from ..shader_library import ShaderLibrary, set_uniforms
+
+if TYPE_CHECKING:
+    import moderngl
+
+GROUP_SIZE = 64
+# Blocks along each axis of the next larger block.
+BRANCHING = 4
+# Invocations that keep a large device busy: long lists of few blocks are shared among several.
+ENOUGH_INVOCATIONS = 1 << 16
+LEAST_LIGHTS_PER_PART = 64
+# Invocations in one dispatch, so that a software renderer hears of a cancellation.
+INVOCATIONS_PER_DISPATCH = 1 << 18
+MAX_GROUPS_PER_AXIS = 65535
+VALUES_PER_RUN = 64
+
+_BINDINGS = (
+    "HALF_BALL_BINDING",
+    "EDGE_BINDING",
+    "PARENT_POSITION_BINDING",
+    "PARENT_LIGHT_BINDING",
+    "POSITION_BINDING",
+    "LIGHT_BINDING",
+)
+_DEFINES = {name: binding for binding, name in enumerate(_BINDINGS)} | {
+    "VALUE_BINDING": 0,
+    "RUN_SUM_BINDING": 1,
+    "GROUP_SIZE": GROUP_SIZE,
+    "BRANCHING": BRANCHING,
+    "RUN": VALUES_PER_RUN,
+}
+
+
+@dataclass(frozen=True)
+class GpuCellLists:
+    """Lists of cells on the device, as core.cell_lists.CellLists: offsets (cells + 1) and light_ids, uint32."""
+
+    offsets: moderngl.Buffer
+    light_ids: moderngl.Buffer
+    entries: int
+
+    def read(self) -> CellLists:
+        """The lists on the host."""
+        return CellLists(_uints(self.offsets), _uints(self.light_ids)[: self.entries])
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """Half balls and the cells' faces on the device."""
+
+    half_balls: moderngl.Buffer
+    edges: moderngl.Buffer
+    cells_per_axis: int
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Blocks of `side` cells along each axis, per_axis of them. Part p of block b begins at positions[b parts + p]."""
+
+    side: int
+    per_axis: int
+    parts: int
+    positions: moderngl.Buffer
+
+    @property
+    def count(self) -> int:
+        """Blocks along all axes."""
+        return self.per_axis**3
+
+    @property
+    def slots(self) -> int:
+        """Parts of all blocks."""
+        return self.count * self.parts
+
+    def offsets(self) -> npt.NDArray[np.uint32]:
+        """(count + 1,): where each block begins, and the entries of all."""
+        return _uints(self.positions)[:: self.parts]
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """Cells whose lists are counted, and the blocks and lights that they are to be filled from."""
+
+    inputs: _Inputs
+    cells: _Blocks
+    parents: _Blocks
+    parent_lights: moderngl.Buffer
+    entries: int
+
+
+class LightGridPass:
+    """Builds the lists of a grid of cells (seed 002, 4.2)."""
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
+        self._context = context
+        self._refine = {
+            (exact, fill): shaders.compute("passes/light_grid_refine.comp", {**_DEFINES, "EXACT": exact, "FILL": fill})
+            for exact in (False, True)
+            for fill in (False, True)
+        }
+        self._sum = {
+            spread: shaders.compute("passes/light_grid_sum.comp", {**_DEFINES, "SPREAD": spread})
+            for spread in (False, True)
+        }
+        self._block_limit = int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
+
+    def build(self, half_balls: HalfBalls, edges: Float32, progress: Progress = silent) -> GpuCellLists:
+        """The lights whose half ball overlaps each cell, on the device; arguments as `build_cell_lists`.
+
+        Raises DeviceError where the device's blocks are too small for the lists, Cancelled when `progress` says so.
+        """
+        counted = self._counted(half_balls, edges, progress)
+        lights = self._buffer(counted.entries)
+        self._fill(counted, lights, (0, counted.cells.count), 0, progress)
+        cells = counted.cells
+        offsets = cells.positions if cells.parts == 1 else self._uploaded(cells.offsets())
+        return GpuCellLists(offsets, lights, counted.entries)
+
+    def build_lists(self, half_balls: HalfBalls, edges: Float32, progress: Progress = silent) -> CellLists:
+        """The same on the host, however long the lists are. Raises DeviceError, Cancelled."""
+        counted = self._counted(half_balls, edges, progress)
+        offsets = counted.cells.offsets()
+        light_ids = np.empty(counted.entries, np.uint32)
+        ranges = list(_ranges(offsets, self._block_limit // 4))
+        lights = self._buffer(max(int(offsets[end]) - int(offsets[first]) for first, end in ranges))
+        for first, end in ranges:
+            start, stop = int(offsets[first]), int(offsets[end])
+            if start < stop:
+                self._fill(counted, lights, (first, end), start, progress)
+                light_ids[start:stop] = np.frombuffer(lights.read(4 * (stop - start)), np.uint32)
+        return CellLists(offsets, light_ids)
+
+    def _counted(self, half_balls: HalfBalls, edges: Float32, progress: Progress) -> _Counted:
+        """From one block that holds all cells and lights down to the lists of the cells, which are counted only."""
+        records = _records(half_balls).tobytes() or bytes(HALF_BALL.dtype.itemsize)
+        faces = self._context.buffer(np.ascontiguousarray(edges, np.float32).tobytes())
+        inputs = _Inputs(self._context.buffer(records), faces, edges.shape[1] - 1)
+        total = longest = len(half_balls)
+        blocks = _Blocks(BRANCHING * inputs.cells_per_axis, 1, 1, self._uploaded(np.array([0, total])))
+        lights = self._uploaded(np.arange(max(total, 1)))
+        for side in _sides(inputs.cells_per_axis):
+            if BRANCHING**3 * total >= 2**32:
+                raise DeviceError("the light grid may have 2^32 entries or more; use a smaller grid or range")
+            per_axis = -(-inputs.cells_per_axis // side)
+            parts = _parts(per_axis**3, longest)
+            children = _Blocks(side, per_axis, parts, self._buffer(per_axis**3 * parts + 1))
+            self._run(inputs, children, blocks, lights, None, (0, children.count), 0, progress)
+            self._sum_up(children.positions, children.slots + 1)
+            if side == 1:
+                break
+            offsets = children.offsets().astype(np.int64)
+            total, longest = int(offsets[-1]), int(np.diff(offsets).max())
+            child_lights = self._buffer(total)
+            self._run(inputs, children, blocks, lights, child_lights, (0, children.count), 0, progress)
+            blocks, lights = children, child_lights
+        entries = int(np.frombuffer(children.positions.read(4, offset=4 * children.slots), np.uint32)[0])
+        return _Counted(inputs, children, blocks, lights, entries)
+
+    def _fill(
+        self,
+        counted: _Counted,
+        lights: moderngl.Buffer,
+        cell_range: tuple[int, int],
+        first_light: int,
+        progress: Progress,
+    ) -> None:
+        """Writes the lists of a range of cells, of which the first begins at position `first_light` of all lists."""
+        self._run(
+            counted.inputs,
+            counted.cells,
+            counted.parents,
+            counted.parent_lights,
+            lights,
+            cell_range,
+            first_light,
+            progress,
+        )
+
+    def _run(
+        self,
+        inputs: _Inputs,
+        blocks: _Blocks,
+        parents: _Blocks,
+        parent_lights: moderngl.Buffer,
+        lights: moderngl.Buffer | None,
+        block_range: tuple[int, int],
+        first_light: int,
+        progress: Progress,
+    ) -> None:
+        """Counts the lights of a range of blocks, or writes them to `lights`, whose first has position first_light."""
+        buffers = (inputs.half_balls, inputs.edges, parents.positions, parent_lights, blocks.positions, lights)
+        for binding, buffer in enumerate(buffers):
+            if buffer is not None:
+                buffer.bind_to_storage_buffer(binding)
+        shader = self._refine[blocks.side == 1, lights is not None]
+        values = {
+            "cells_per_axis": inputs.cells_per_axis,
+            "side": blocks.side,
+            "blocks_per_axis": blocks.per_axis,
+            "parents_per_axis": parents.per_axis,
+            "parent_parts": parents.parts,
+            "parts": blocks.parts,
+            "first_light": first_light,
+        }
+        first, end = (block * blocks.parts for block in block_range)
+        for start in range(first, end, INVOCATIONS_PER_DISPATCH):
+            stop = min(start + INVOCATIONS_PER_DISPATCH, end)
+            set_uniforms(shader, {**values, "first": start, "end": stop})
+            self._dispatch(shader, stop - start)
+            step(progress, stop / blocks.slots, "light grid")
+
+    def _sum_up(self, values: moderngl.Buffer, count: int) -> None:
+        """Replaces each of `count` values by the sum of those before it."""
+        runs = -(-count // VALUES_PER_RUN)
+        run_sums = self._uploaded(np.zeros(runs))
+        if runs > 1:
+            self._sum_runs(False, values, run_sums, count)
+            self._sum_up(run_sums, runs)
+        self._sum_runs(True, values, run_sums, count)
+
+    def _sum_runs(self, spread: bool, values: moderngl.Buffer, run_sums: moderngl.Buffer, count: int) -> None:
+        values.bind_to_storage_buffer(_DEFINES["VALUE_BINDING"])
+        run_sums.bind_to_storage_buffer(_DEFINES["RUN_SUM_BINDING"])
+        set_uniforms(self._sum[spread], {"count": count})
+        self._dispatch(self._sum[spread], -(-count // VALUES_PER_RUN))
+
+    def _dispatch(self, shader: moderngl.ComputeShader, invocations: int) -> None:
+        groups = -(-invocations // GROUP_SIZE)
+        wide = min(groups, MAX_GROUPS_PER_AXIS)
+        shader.run(wide, -(-groups // wide))
+        self._context.memory_barrier()
+
+    def _buffer(self, count: int) -> moderngl.Buffer:
+        size = 4 * max(count, 1)
+        if size > self._block_limit:
+            needs, holds = (f"{1e-6 * size:,.0f} MB" for size in (size, self._block_limit))
+            raise DeviceError(f"the light grid needs a block of {needs}, the device holds {holds}; use a smaller grid")
+        return self._context.buffer(reserve=size)
+
+    def _uploaded(self, values: npt.NDArray[Any]) -> moderngl.Buffer:
+        return self._context.buffer(values.astype(np.uint32).tobytes())
+
+
+def _sides(cells_per_axis: int) -> Iterator[int]:
+    """Cells along the blocks of each size, from the largest that does not hold all cells to 1."""
+    side = 1
+    while side * BRANCHING < cells_per_axis:
+        side *= BRANCHING
+    while side >= 1:
+        yield side
+        side //= BRANCHING
+
+
+def _parts(blocks: int, longest: int) -> int:
+    """Into how many parts the lists that blocks look through are cut."""
+    return max(1, min(ENOUGH_INVOCATIONS // blocks, longest // LEAST_LIGHTS_PER_PART))
+
+
+def _ranges(offsets: npt.NDArray[np.uint32], most: int) -> Iterator[tuple[int, int]]:
+    """First and end of runs of cells whose lists together hold at most `most` lights, or of one cell."""
+    first = 0
+    while first < len(offsets) - 1:
+        end = int(np.searchsorted(offsets, int(offsets[first]) + most, "right")) - 1
+        first, start = max(end, first + 1), first
+        yield start, first
+
+
+def _records(half_balls: HalfBalls) -> np.ndarray:
+    records = HALF_BALL.zeros(len(half_balls))
+    records["centre"] = half_balls.centres.T
+    records["radius_squared"] = half_balls.radii_squared
+    records["normal"] = half_balls.normals.T
+    records["inverse_normal"] = half_balls.inverse_normals.T
+    return records
+
+
+def _uints(buffer: moderngl.Buffer) -> npt.NDArray[np.uint32]:
+    return np.frombuffer(buffer.read(), np.uint32)
