@@ -144,3 +144,25 @@ def test_one_picture_alone_has_enough_points_of_a_soft_lamp(device: Device) -> N
     steps = np.abs(np.diff(row)) / row.max()
     assert steps.max() < 6.0 / np.sqrt(SOFT_POINTS) / 4.0
     assert row.min() < 0.1 * row.max()
+
+
+@pytest.mark.parametrize("material", list(MATERIALS))
+@pytest.mark.parametrize("lamp", list(LAMPS))
+def test_a_million_watts_are_a_million_times_one(device: Device, lamp: str, material: str) -> None:
+    dim = rendered(device, [replace(LAMPS[lamp], power=(1.0, 1.0, 1.0))], MATERIALS[material])[0]
+    bright = rendered(device, [replace(LAMPS[lamp], power=(1e6, 1e6, 1e6))], MATERIALS[material])[0]
+    assert np.isfinite(bright).all()
+    np.testing.assert_allclose(bright, 1e6 * dim, rtol=1e-5)
+
+
+@pytest.mark.parametrize("extent", [0.0, 1e-6, 1e6])
+@pytest.mark.parametrize("lamp", list(LAMPS))
+def test_floor_through_the_middle_of_a_bright_lamp_stays_finite(device: Device, lamp: str, extent: float) -> None:
+    """A lamp in the floor, of no, tiny and huge extent, its specular lobe at its narrowest."""
+    light = replace(
+        LAMPS[lamp], power=(1e6, 1e6, 1e6), position=(0.0, 0.0, 0.0), radius=extent, size_x=extent, size_y=extent
+    )
+    mirror = replace(MATERIALS["metal"], roughness=0.0)
+    radiance = rendered(device, [light], mirror)[0]
+    assert np.isfinite(radiance).all()
+    assert (radiance >= 0.0).all()

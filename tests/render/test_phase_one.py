@@ -220,3 +220,15 @@ def test_very_bright_light_stays_finite(device: Device) -> None:
     lamp = replace(LAMPS["point"], power=(1e6, 1e6, 1e6), position=(0.0, 0.0, 1e-4))
     found = radiosity(device, [FLOOR], [lamp], light_mesh(np.zeros((1, 3)), [0, 1]))
     assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("name", list(LAMPS))
+def test_a_million_watts_and_colours_of_a_million(device: Device, name: str) -> None:
+    points = random_points(40)
+    mesh = light_mesh(points, list(range(41)))
+    dim = radiosity(device, [FLOOR, SHADE], [LAMPS[name]], replace(mesh, emission=0.0 * mesh.emission))
+    bright_lamp = replace(LAMPS[name], power=tuple(1e6 * value for value in POWER))
+    bright_mesh = replace(mesh, colour=1e6 * mesh.colour, emission=0.0 * mesh.emission)
+    bright = radiosity(device, [FLOOR, SHADE], [bright_lamp], bright_mesh)
+    assert np.isfinite(bright).all()
+    np.testing.assert_allclose(bright, 1e12 * dim, rtol=1e-5)
