@@ -175,6 +175,35 @@ def _facing(light: Light, points: np.ndarray) -> np.ndarray:
     return 1.0 / (4.0 * math.pi * reach)
 
 
+@pytest.mark.parametrize("extent", list(EXTENTS))
+@pytest.mark.parametrize("name", list(LAMPS))
+def test_ray_from_a_point_that_touches_the_lamp(device: Device, name: str, extent: str) -> None:
+    """Finite, not negative, unit or without direction, no light from behind and at most the hemisphere of an area."""
+    light = sized(flat(replace(LAMPS[name], power=(1e6, 1e6, 1e6), position=(0.0, 0.0, 0.0))), EXTENTS[extent])
+    points, _ = receivers_at(light, EXTENTS[extent])
+    irradiance, angle = ray(device, light, points)
+    assert np.isfinite(irradiance).all()
+    assert np.isfinite(angle).all()
+    assert (irradiance >= 0.0).all()
+    assert (angle >= 0.0).all()
+    literal = lamp_literal(light, lamps.lamp_samples(light, 4)[0])
+    lengths = np.linalg.norm(
+        evaluate(device, "lib/lights.glsl", f"lamp_ray({literal}, p).direction", {"p": points}, components=3), axis=1
+    )
+    assert ((np.abs(lengths - 1.0) < 1e-5) | (lengths < 1e-5)).all()
+    if light.kind == AREA:
+        assert not irradiance[points[:, 2] >= 0.0].any()
+        assert (angle <= 4.0 * math.pi).all()
+    if light.kind == SUN:
+        np.testing.assert_allclose(irradiance, 1e6)
+
+
+def test_arctangent_of_nothing_is_nothing(device: Device) -> None:
+    inputs = {"y": np.zeros(3), "x": np.array([0.0, 1.0, -1.0])}
+    found = evaluate(device, "lib/lights.glsl", "half_circle_arctangent(y, x)", inputs)
+    np.testing.assert_allclose(found, [0.0, 0.0, math.pi], atol=1e-6)
+
+
 DEGENERATE = {
     "area without size": replace(BASE, kind=AREA, size_x=0.0, size_y=0.0),
     "area without width": replace(BASE, kind=AREA, size_x=0.0, size_y=1.0),
