@@ -119,7 +119,7 @@ def test_lights_without_area_and_lights_not_chosen_are_in_no_cell():
     corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]] * 3, float)
     corners[1, 2] = corners[1, 1]
     grid = LightGrid.bake(
-        lights_from_triangles(corners), BOX, GridSettings(3, 2.0), chosen=np.array([True, True, False])
+        lights_from_triangles(corners), BOX, GridSettings(3, 2.0), chosen=np.array([1, 1, 0], bool)
     )
     assert set(grid.lists.light_ids) == {0}
 

@@ -25,8 +25,10 @@ MAX_CELLS_PER_AXIS = 256
 _SLACK = 1e-6
 # Under this component of the normal along a row, the plane does not bound the row.
 _LEAST_SLOPE = 1e-3
-# Pairs of a cell and a light that are tested at once: their arrays stay in a core's cache.
-_PAIRS_PER_BLOCK = 1 << 16
+# Of a place along an axis, in cells: some roundings at MAX_CELLS_PER_AXIS.
+_COLUMN_ROUNDING = 1e-4
+# Rows of cells that are looked at at once: their arrays stay in a core's cache.
+_ROWS_PER_BLOCK = 1 << 15
 _THREADS = 2
 
 Ints = npt.NDArray[Any]
@@ -147,28 +149,35 @@ def _slab(half_balls: HalfBalls, edges: Float32, k: int, lights: Ints) -> tuple[
     """Lengths of the lists of slab k's cells, and the lists."""
     per_axis = edges.shape[1] - 1
     chosen = half_balls.take(lights)
-    runs = _runs(chosen, edges, k)
-    counts = runs.last - runs.first + 1
-    cells = expand(runs.rows * per_axis + runs.first, counts).astype(np.uint16)
-    slab_lights = np.repeat(lights[runs.lights].astype(np.uint32), counts)
-    run_starts = np.cumsum(counts) - counts
-
-    before, after = runs.sure_first - runs.first, runs.last - runs.sure_last
-    doubtful = np.concatenate((expand(run_starts, before), expand(run_starts + counts - after, after)))
-    members = np.concatenate((np.repeat(runs.lights, before), np.repeat(runs.lights, after)))
-    missed = np.concatenate(
-        [
-            doubtful[part][~_cells_overlap(chosen.take(members[part]), edges, k, cells[doubtful[part]])]
-            for part in _parts(len(doubtful))
-        ]
-    )
-    cells, slab_lights = np.delete(cells, missed), np.delete(slab_lights, missed)
+    first_rows, last_rows = _axis_range(chosen, edges, 1)
+    row_counts = np.maximum(last_rows - first_rows + 1, 0)
+    groups = np.cumsum(row_counts) // _ROWS_PER_BLOCK
+    blocks = np.split(np.arange(len(lights)), np.flatnonzero(np.diff(groups)) + 1)
+    pairs = [
+        _pairs(chosen.take(block), edges, k, first_rows[block], row_counts[block], lights[block]) for block in blocks
+    ]
+    cells, slab_lights = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     order = np.argsort(cells, kind="stable")
     return np.bincount(cells, minlength=per_axis * per_axis), slab_lights[order]
 
 
-def _parts(count: int) -> list[slice]:
-    return [slice(start, start + _PAIRS_PER_BLOCK) for start in range(0, max(count, 1), _PAIRS_PER_BLOCK)]
+def _pairs(
+    half_balls: HalfBalls, edges: Float32, k: int, first_rows: Ints, row_counts: Ints, lights: Ints
+) -> tuple[Ints, npt.NDArray[np.uint32]]:
+    """Cells of slab k and the lights that reach them, by light: every pair once."""
+    runs = _runs(half_balls, edges, k, first_rows, row_counts)
+    counts = runs.last - runs.first + 1
+    starts = np.cumsum(counts) - counts
+    cells = expand(runs.rows * (edges.shape[1] - 1) + runs.first, counts).astype(np.uint16)
+    cell_lights = np.repeat(lights[runs.lights].astype(np.uint32), counts)
+
+    before, after = runs.sure_first - runs.first, runs.last - runs.sure_last
+    doubtful = np.concatenate((expand(starts, before), expand(starts + counts - after, after)))
+    members = np.concatenate((np.repeat(runs.lights, before), np.repeat(runs.lights, after)))
+    reached = _cells_overlap(half_balls.take(members), edges, k, cells[doubtful])
+    keep = np.ones(len(cells), bool)
+    keep[doubtful[~reached]] = False
+    return cells[keep], cell_lights[keep]
 
 
 def _cells_overlap(half_balls: HalfBalls, edges: Float32, k: int, cells: Ints) -> npt.NDArray[np.bool_]:
@@ -180,12 +189,10 @@ def _cells_overlap(half_balls: HalfBalls, edges: Float32, k: int, cells: Ints) -
     return overlaps(half_balls, low, high)
 
 
-def _runs(half_balls: HalfBalls, edges: Float32, k: int) -> _Runs:
-    """The runs of slab k, by light."""
-    first_row, last_row = _axis_range(half_balls, edges, 1)
-    counts = np.maximum(last_row - first_row + 1, 0)
-    lights = np.repeat(np.arange(len(half_balls)), counts)
-    rows = expand(first_row, counts)
+def _runs(half_balls: HalfBalls, edges: Float32, k: int, first_rows: Ints, row_counts: Ints) -> _Runs:
+    """The runs of slab k, by light; row_counts rows of each light from first_rows on are looked at."""
+    lights = np.repeat(np.arange(len(half_balls)), row_counts)
+    rows = expand(first_rows, row_counts)
     (cx, cy, cz), (nx, ny, nz) = half_balls.centres[:, lights], half_balls.normals[:, lights]
     radii_squared = half_balls.radii_squared[lights]
     low_y, high_y, low_z, high_z = edges[1, rows] - cy, edges[1, rows + 1] - cy, edges[2, k] - cz, edges[2, k + 1] - cz
@@ -198,22 +205,45 @@ def _runs(half_balls: HalfBalls, edges: Float32, k: int) -> _Runs:
     # The most that y and z add to the height over the light's plane in this row.
     lift = np.maximum(ny * low_y, ny * high_y) + np.maximum(nz * low_z, nz * high_z) + slack
     low, high, _ = _lit_part(nx, lift, reach)
-    first, last = _touched(edges[0], cx + low - slack, cx + high + slack)
-    reached = (room >= 0.0) & (lift + np.abs(nx) * reach >= 0.0) & (low <= high + slack) & (first <= last)
+    columns = _Columns(edges[0])
+    first, last = columns.of(cx + low - slack, -1.0), columns.of(cx + high + slack, 1.0)
+    reached = (room >= 0.0) & (lift + np.abs(nx) * reach >= 0.0) & (low <= high + slack)
+    first, last = np.maximum(first, 0), np.minimum(last, columns.count - 1)
+    reached &= first <= last
 
     sure_room = radii_squared * (1.0 - _SLACK) - across_squared
     sure_reach = np.sqrt(np.maximum(sure_room, 0.0)) - slack
     near_lift = ny * near_y + nz * near_z - slack
     low, high, crossing = _lit_part(nx, near_lift, sure_reach)
-    sure_first, sure_last = _touched(edges[0], cx + low + slack, cx + high - slack)
+    sure_first, sure_last = columns.of(cx + low + slack, 1.0), columns.of(cx + high - slack, -1.0)
     # A cell's near point is its end towards the centre, which must be on the lit side of the crossing.
     sure_first += (nx > _LEAST_SLOPE) & (crossing > 0.0)
     sure_last -= (nx < -_LEAST_SLOPE) & (crossing < 0.0)
     sure_first, sure_last = np.maximum(sure_first, first), np.minimum(sure_last, last)
     flat = (np.abs(nx) <= _LEAST_SLOPE) & (near_lift < np.abs(nx) * reach)
-    unsure = flat | (sure_room <= 0.0) | (high - low <= 2.0 * slack) | (sure_first > sure_last)
+    narrow = high - low <= 2.0 * (slack + columns.doubt)
+    unsure = flat | (sure_room <= 0.0) | narrow | (sure_first > sure_last)
     sure_first, sure_last = np.where(unsure, last + 1, sure_first), np.where(unsure, last, sure_last)
     return _Runs(*(values[reached] for values in (lights, rows, first, last, sure_first, sure_last)))
+
+
+class _Columns:
+    """Cells of about one width along an axis, found without a search."""
+
+    def __init__(self, edges: Float32) -> None:
+        self.count = len(edges) - 1
+        self._start = edges[0]
+        self._per_unit = self.count / (edges[-1] - edges[0])
+        widths = np.linspace(0.0, self.count, len(edges))
+        off = np.abs((edges - self._start) * self._per_unit - widths).max() + _COLUMN_ROUNDING
+        self._doubt_in_cells = np.float32(off)
+        self.doubt = np.float32(off / self._per_unit)
+        """How far, in the frame, a place may be from where it seems to be among the cells."""
+
+    def of(self, places: Floats, towards: float) -> Ints:
+        """int32 cell of each place, rounded up (towards 1) or down (-1) in doubt; -1 and `count` beyond the ends."""
+        cells = (places - self._start) * self._per_unit + towards * self._doubt_in_cells
+        return np.floor(np.clip(cells, -1.0, self.count)).astype(np.int32)
 
 
 def _lit_part(nx: Floats, lift: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:

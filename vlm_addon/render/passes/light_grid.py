@@ -154,7 +154,7 @@ class LightGridPass:
 
     def _counted(self, half_balls: HalfBalls, edges: Float32, progress: Progress) -> _Counted:
         """From one block that holds all cells and lights down to the lists of the cells, which are counted only."""
-        records = _records(half_balls).tobytes() or bytes(HALF_BALL.dtype.itemsize)
+        records = half_ball_records(half_balls).tobytes() or bytes(HALF_BALL.dtype.itemsize)
         faces = self._context.buffer(np.ascontiguousarray(edges, np.float32).tobytes())
         inputs = _Inputs(self._context.buffer(records), faces, edges.shape[1] - 1)
         total = longest = len(half_balls)
@@ -287,7 +287,8 @@ def _ranges(offsets: npt.NDArray[np.uint32], most: int) -> Iterator[tuple[int, i
         yield start, first
 
 
-def _records(half_balls: HalfBalls) -> np.ndarray:
+def half_ball_records(half_balls: HalfBalls) -> np.ndarray:
+    """(n,) records of HALF_BALL."""
     records = HALF_BALL.zeros(len(half_balls))
     records["centre"] = half_balls.centres.T
     records["radius_squared"] = half_balls.radii_squared

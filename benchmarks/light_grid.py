@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Building the light grid: the thesis's brute force against ours, on the device and on the processor.
+
+`./dev bench light_grid [lights …] [--grid n …]` prints a table like the thesis's table 5.2. All three build the same
+lists, which is checked. Where brute force would take more than `--tests` tests, it builds one in 10 or 100 groups of 64
+cells, spread over the grid, and its time is multiplied by that number. Milliseconds are wall clock to the end of all work; processor milliseconds are those of
+all threads, so that they mean the same on a busy machine (on a GPU they mean nothing).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vlm_addon.core.active_hemisphere import HalfBalls
+from vlm_addon.core.cell_lists import CellLists, build_cell_lists
+from vlm_addon.core.light_grid import light_shapes, make_frame
+from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
+from vlm_addon.core.scene import Float32, Float64
+from vlm_addon.render.device import Device
+from vlm_addon.render.passes.light_grid import GROUP_SIZE, LightGridPass, half_ball_records
+from vlm_addon.render.shader_library import set_uniforms
+from vlm_addon.terminal import table
+
+BRUTE_FORCE = "../benchmarks/rivals/light_grid_brute_force.comp"
+RANGE = 4.0
+LIGHTS, GRIDS = (10_000, 100_000), (10, 20, 40, 60, 100)
+MOST_TESTS = 1_000_000_000
+PARTS = (1, 10, 100, 1000)
+# A dispatch of so many tests ends within some seconds on two cores.
+TESTS_PER_DISPATCH = 400_000_000
+
+HALL = np.array([30.0, 12.0, 18.0])
+COLUMN_RADIUS, COLUMNS = 0.5, (8, 2)
+
+THESIS_MS = {
+    10_000: {10: 1.18, 20: 9.82, 30: 33.73, 40: 80.24, 50: 155.63, 60: 269.67, 70: 428.74, 80: 638.51, 90: 908.59,
+             100: 1247.95},
+    100_000: {10: 12.56, 20: 99.38, 30: 337.15, 40: 800.26, 50: 1560.68, 60: 2699.22, 70: 4281.91, 80: 6389.94,
+              90: 9109.06, 100: 12494.19},
+}  # fmt: skip
+"""Seed 002, table 5.2: a GTX 950 and Crytek's Sponza, its range and its greatest list not stated."""
+
+HEADER = (
+    "lights, grid",
+    "1 cell in",
+    "brute force ms",
+    "(processor)",
+    "shaders ms",
+    "(processor)",
+    "faster",
+    "(processor)",
+    "numpy ms",
+    "(processor)",
+    "lights / cell",
+    "fullest",
+    "lists MB",
+    "fixed MB",
+    "fixed / lists",
+    "thesis ms",
+)
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Milliseconds of wall clock and of all threads, and what was made."""
+
+    wall: float
+    processor: float
+    result: Any
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("lights", nargs="*", type=int, default=LIGHTS)
+    parser.add_argument("--grid", nargs="+", type=int, default=GRIDS)
+    parser.add_argument("--tests", type=float, default=MOST_TESTS, help="most tests that brute force may take")
+    options = parser.parse_args()
+    with Device() as device, device.current():
+        print(f"{device.name}, range {RANGE:g}")
+        rows = [row(device, lights, cells, options.tests) for lights in options.lights for cells in options.grid]
+        print(table(HEADER, rows))
+
+
+def row(device: Device, lights: int, cells: int, most_tests: float) -> tuple[str, ...]:
+    """One line of the table."""
+    light_mesh = hall_lights(lights)
+    frame = make_frame((np.zeros(3), HALL), cells)
+    half_balls = light_shapes(light_mesh, frame, RANGE).half_balls
+    builder = LightGridPass(device.context, device.shaders)
+    # Once before it is timed: the first run compiles shaders.
+    small = make_frame((np.zeros(3), HALL), 2)
+    builder.build_lists(half_balls.take(slice(0, 10)), small.edges)
+    shaders = timed(device, lambda: builder.build_lists(half_balls, frame.edges))
+    numpy_path = timed(device, lambda: build_cell_lists(half_balls, frame.edges))
+    lists: CellLists = numpy_path.result
+    counts = lists.counts
+    fullest = int(counts.max())
+    part = next((part for part in PARTS if cells**3 * lights / part <= most_tests), PARTS[-1])
+    brute = timed(device, lambda: brute_force(device, half_balls, frame.edges, fullest, part))
+    require_same(lists, shaders.result, brute.result, part)
+    fixed = 4e-6 * cells**3 * fullest
+    thesis = THESIS_MS.get(lights, {}).get(cells)
+    return (
+        f"{lights:,}, {cells}³",
+        f"{part}",
+        f"{part * brute.wall:,.0f}",
+        f"{part * brute.processor:,.0f}",
+        f"{shaders.wall:,.0f}",
+        f"{shaders.processor:,.0f}",
+        f"{part * brute.wall / shaders.wall:,.0f}",
+        f"{part * brute.processor / shaders.processor:,.0f}",
+        f"{numpy_path.wall:,.0f}",
+        f"{numpy_path.processor:,.0f}",
+        f"{counts.mean():.1f}",
+        f"{fullest:,}",
+        f"{1e-6 * lists.nbytes:.1f}",
+        f"{fixed:.1f}",
+        f"{1e6 * fixed / lists.nbytes:.1f}",
+        f"{thesis:,.0f}" if thesis else "",
+    )
+
+
+def timed(device: Device, work: Callable[[], Any]) -> Timed:
+    """Runs `work` once."""
+    device.context.finish()
+    wall, processor = time.perf_counter(), time.process_time()
+    result = work()
+    device.context.finish()
+    return Timed(1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - processor), result)
+
+
+def brute_force(device: Device, half_balls: HalfBalls, edges: Float32, max_lights: int, part: int) -> Any:
+    """(cells, max_lights) uint32 lists of one in `part` groups of cells, by the thesis's shader."""
+    context = device.context
+    shader = device.shaders.compute(BRUTE_FORCE, {"GROUP_SIZE": GROUP_SIZE})
+    cells_per_axis = edges.shape[1] - 1
+    groups = -(-(cells_per_axis**3) // (GROUP_SIZE * part))
+    records = context.buffer(half_ball_records(half_balls).tobytes())
+    faces = context.buffer(edges.tobytes())
+    lists = context.buffer(reserve=4 * groups * GROUP_SIZE * max_lights)
+    for binding, buffer in enumerate((records, faces, lists)):
+        buffer.bind_to_storage_buffer(binding)
+    values = {"cells_per_axis": cells_per_axis, "light_count": len(half_balls), "max_lights": max_lights}
+    chunk = max(1, TESTS_PER_DISPATCH // (GROUP_SIZE * len(half_balls)))
+    for first in range(0, groups, chunk):
+        set_uniforms(shader, {**values, "group_step": part, "first_group": first})
+        shader.run(min(chunk, groups - first))
+        context.finish()
+    return lists
+
+
+def require_same(lists: CellLists, by_shaders: CellLists, brute_buffer: Any, part: int) -> None:
+    """Stops the benchmark where two ways differ."""
+    same = np.array_equal(lists.offsets, by_shaders.offsets) and np.array_equal(lists.light_ids, by_shaders.light_ids)
+    counts = lists.counts
+    fullest = int(counts.max())
+    found = np.frombuffer(brute_buffer.read(), np.uint32).reshape(-1, fullest)
+    slots = np.arange(len(found))
+    cells = slots // GROUP_SIZE * GROUP_SIZE * part + slots % GROUP_SIZE
+    found, cells = found[cells < len(counts)], cells[cells < len(counts)]
+    filled = np.arange(fullest) < counts[cells][:, None]
+    starts = lists.offsets[cells].astype(np.int64)
+    expected = lists.light_ids[(starts[:, None] + np.arange(fullest))[filled]]
+    if not (same and np.array_equal(found[filled], expected) and (found[~filled] > lists.light_ids.max()).all()):
+        raise SystemExit("the ways to build a grid differ")
+
+
+def hall_lights(count: int) -> VirtualLightMesh:
+    """`count` triangles of about one size on walls, floor, ceiling and columns of a hall, turned at random."""
+    rng = np.random.default_rng(count)
+    points, normals, area = hall_surface(rng, count)
+    tangents = np.cross(normals, np.where(np.abs(normals[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    angles = rng.uniform(0.0, 2.0 * np.pi, (count, 1)) + np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
+    angles += rng.uniform(-0.5, 0.5, angles.shape)
+    # A regular triangle of circumradius r has an area of 1.3 r².
+    radii = np.sqrt(area / count / 1.3) * rng.uniform(0.7, 1.3, (count, 1))
+    along, across = (radii * np.cos(angles))[..., None], (radii * np.sin(angles))[..., None]
+    corners = points[:, None] + along * tangents[:, None] + across * np.cross(normals, tangents)[:, None]
+    return _light_mesh(corners)
+
+
+def hall_surface(rng: np.random.Generator, count: int) -> tuple[Float64, Float64, float]:
+    """(count, 3) random points on the hall's surfaces, their normals, and the area of all surfaces in m²."""
+    sides = np.array([HALL[1] * HALL[2], HALL[0] * HALL[2], HALL[0] * HALL[1]])
+    column = 2.0 * np.pi * COLUMN_RADIUS * HALL[1]
+    areas = np.concatenate((sides, sides, [column * np.prod(COLUMNS)]))
+    kinds = rng.choice(7, count, p=areas / areas.sum())
+    points = rng.uniform(0.0, 1.0, (count, 3)) * HALL
+    normals = np.zeros((count, 3))
+    for kind in range(6):
+        axis, chosen = kind % 3, kinds == kind
+        points[chosen, axis] = HALL[axis] if kind >= 3 else 0.0
+        normals[chosen, axis] = -1.0 if kind >= 3 else 1.0
+    chosen = kinds == 6
+    angles = rng.uniform(0.0, 2.0 * np.pi, chosen.sum())
+    around = np.stack((np.cos(angles), np.zeros_like(angles), np.sin(angles)), axis=1)
+    places = np.stack([(rng.integers(0, n, chosen.sum()) + 0.5) / n for n in COLUMNS])
+    points[chosen, 0], points[chosen, 2] = places[0] * HALL[0], (0.25 + 0.5 * places[1]) * HALL[2]
+    points[chosen] += COLUMN_RADIUS * around
+    normals[chosen] = around
+    return points, normals, float(areas.sum())
+
+
+def _light_mesh(corners: Float64) -> VirtualLightMesh:
+    count = len(corners)
+    samples = SourceSamples(
+        corners.mean(axis=1), np.zeros((count, 3), np.float32), np.ones(count, np.float32), np.arange(count + 1)
+    )
+    return VirtualLightMesh(
+        vertices=corners.reshape(-1, 3),
+        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+        colour=np.ones((count, 3), np.float32),
+        emission=np.zeros((count, 3), np.float32),
+        strength=np.ones(count, np.float32),
+        tag_ids=np.zeros(count, np.int32),
+        dynamic=np.zeros(count, bool),
+        samples=samples,
+    )
+
+
+if __name__ == "__main__":
+    main()
