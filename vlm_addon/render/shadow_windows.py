@@ -18,6 +18,8 @@ import numpy.typing as npt
 from ..core.scene import Float64, Int32
 from .view import View
 
+Int64 = npt.NDArray[np.int64]
+
 WHOLE_SCENE = 0
 """Index of the window that holds everything."""
 STEP = 4.0
@@ -33,6 +35,8 @@ _GRID = 0.125
 _REACH = 1.0 - 0.5 * math.sqrt(3.0) * _GRID
 # Texels that a light's source samples may lie apart at least.
 _SPACING_TEXELS = 0.5
+# Places that are tried for a window of each size.
+_SEEDS = 4
 
 
 @dataclass(frozen=True)
@@ -143,26 +147,37 @@ def sample_windows(
     wanted = np.where(spacings > 0.0, spacings / _SPACING_TEXELS, np.inf)
     found = 2.0 * radius / (resolution * wanted)
     levels = np.clip(np.ceil(np.log(np.maximum(found, 1.0)) / math.log(STEP)), 0, MOST_NESTED).astype(int)
-    for level in range(1, int(levels.max(initial=0)) + 1):
-        size = radius * STEP**-level
-        left = levels >= level
-        while left.any() and len(windows) <= MOST_OF_SAMPLES:
-            window, held = _window_around(points, left, size)
-            indices[held & (levels >= level)] = len(windows)
-            windows.append(window)
-            left &= ~held
+    given = np.zeros(len(points), int)
+    while (given < levels).any() and len(windows) <= MOST_OF_SAMPLES:
+        level, window = _most_useful(points, levels, given, radius)
+        held = _held(points, window) & (given < np.minimum(levels, level))
+        given[held], indices[held] = np.minimum(levels, level)[held], len(windows)
+        windows.append(window)
     return tuple(windows), indices
 
 
-def _window_around(
-    points: Float64, wanted: npt.NDArray[np.bool_], size: float
-) -> tuple[ShadowWindow, npt.NDArray[np.bool_]]:
-    """A window of radius `size` at the first of the wanted points, moved to the middle of those near it; the points
-    that it holds."""
-    first = points[np.argmax(wanted)]
-    near = points[wanted & (((points - first) ** 2).sum(-1) <= size * size)]
+def _most_useful(points: Float64, levels: Int64, given: Int64, radius: float) -> tuple[int, ShadowWindow]:
+    """The level and window by which the points gain most levels, among some at each level."""
+    found: list[tuple[int, int, ShadowWindow]] = []
+    for level in range(1, int(levels.max()) + 1):
+        lacking = np.flatnonzero(given < np.minimum(levels, level))
+        gains = np.minimum(levels, level)[lacking] - given[lacking]
+        for seed in lacking[np.linspace(0, len(lacking) - 1, _SEEDS).astype(int)] if len(lacking) else ():
+            window = _window_around(points[lacking], points[seed], radius * STEP**-level)
+            found.append((int(gains[_held(points[lacking], window)].sum()), level, window))
+    _, level, window = max(found, key=lambda candidate: candidate[:2])
+    return level, window
+
+
+def _window_around(points: Float64, first: Float64, size: float) -> ShadowWindow:
+    """A window of radius `size` that holds the point `first`, moved to the middle of the points near it."""
+    near = points[((points - first) ** 2).sum(-1) <= size * size]
     middle = 0.5 * (near.min(axis=0) + near.max(axis=0))
     if ((first - middle) ** 2).sum() > size * size:
         middle = first
     x, y, z = middle.tolist()
-    return ShadowWindow((x, y, z), size), ((points - middle) ** 2).sum(-1) <= size * size
+    return ShadowWindow((x, y, z), size)
+
+
+def _held(points: Float64, window: ShadowWindow) -> npt.NDArray[np.bool_]:
+    return ((points - np.array(window.centre)) ** 2).sum(-1) <= window.radius * window.radius
