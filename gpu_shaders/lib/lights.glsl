@@ -42,7 +42,8 @@ float horizon_cosine(float cosine, float sine) {
     if (sine < NARROW_CONE) {
         float root = sqrt(max(1.0 - ratio * ratio, 0.0));
         float angle = half_circle_arctangent(root, -ratio);
-        return sine * (ratio * angle + root * (2.0 + ratio * ratio) * (1.0 / 3.0)) * (1.0 / FORM_FACTOR_PI);
+        float disk = ratio * angle + root * (2.0 + ratio * ratio) * (1.0 / 3.0);
+        return sine * max(disk, 0.0) * (1.0 / FORM_FACTOR_PI);
     }
     float normal_sine = sqrt(max(1.0 - cosine * cosine, 1e-20));
     float x = sqrt(max(1.0 / (sine * sine) - 1.0, 0.0));
@@ -50,7 +51,8 @@ float horizon_cosine(float cosine, float sine) {
     float y_root = sqrt(max(1.0 - y * y, 0.0));
     float chord = normal_sine * y_root;
     float sum = (cosine * half_circle_arctangent(y_root, y) - x * chord) * sine * sine;
-    return (sum + half_circle_arctangent(chord, x)) / (FORM_FACTOR_PI * sine * sine);
+    // Both cancel where almost all of the cone is below the horizon.
+    return max(sum + half_circle_arctangent(chord, x), 0.0) / (FORM_FACTOR_PI * sine * sine);
 }
 
 // Factor on the intensity of a spot along a direction that leaves it; need not be unit.

@@ -230,7 +230,7 @@ def test_spot_squashed_to_nothing_stays_finite(device: Device) -> None:
     np.testing.assert_allclose(found, lamps.lamp_irradiance(light, points, normals), rtol=1e-3, atol=1e-4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     kind=st.sampled_from([POINT, SPOT, SUN, AREA]),
     extent=st.floats(-6.0, 6.0).map(lambda e: 10.0**e),
@@ -303,6 +303,14 @@ def test_cone_over_the_horizon_against_its_closed_form(device: Device, sine: flo
     found = evaluate(device, "lib/lights.glsl", "horizon_cosine(c, s)", {"c": cosines, "s": sines})
     np.testing.assert_allclose(lamps.horizon_cosine(cosines, sines), exact, rtol=0.0, atol=2e-7 * sine)
     np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-4 * sine)
+
+
+@pytest.mark.parametrize("sine", [1e-6, 0.01, 0.029, 0.031, 0.3, 0.93, 0.999999, 1.0])
+def test_cone_almost_below_the_horizon_is_not_negative(device: Device, sine: float) -> None:
+    below = -sine * (1.0 - np.geomspace(1e-7, 1e-2, 400))
+    sines = np.full(400, sine)
+    assert (evaluate(device, "lib/lights.glsl", "horizon_cosine(c, s)", {"c": below, "s": sines}) >= 0.0).all()
+    assert (lamps.horizon_cosine(below, sines) >= 0.0).all()
 
 
 @pytest.mark.parametrize("name", ["spot", "spot without blend", "squashed spot"])

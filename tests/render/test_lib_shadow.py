@@ -179,7 +179,7 @@ def test_points_at_and_behind_the_lamp_stay_finite(device: Device, kind: str) ->
         assert ((found >= 0.0) & (found <= 1.0)).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     kind=st.sampled_from(list(NOTHING)),
     extent=st.floats(-6.0, 6.0).map(lambda e: 10.0**e),

@@ -228,7 +228,7 @@ def horizon_cosine(cosine: Float64, sine: Float64) -> Float64:
     # For narrow cones the terms above cancel; the cone's base is then a flat disk.
     t = c / s
     flat = s * (t * np.arccos(-t) + np.sqrt(np.maximum(1.0 - t * t, 0.0)) * (2.0 + t * t) / 3.0) / np.pi
-    partly = np.where(s < _FLAT_CONE, flat, exact)
+    partly = np.maximum(np.where(s < _FLAT_CONE, flat, exact), 0.0)
     return np.where(cosine >= sine, cosine, np.where(cosine <= -sine, 0.0, partly))
 
 
