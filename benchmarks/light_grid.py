@@ -2,9 +2,10 @@
 """Building the light grid: the thesis's brute force against ours, on the device and on the processor.
 
 `./dev bench light_grid [lights …] [--grid n …]` prints a table like the thesis's table 5.2. All three build the same
-lists, which is checked. Where brute force would take more than `--tests` tests, it builds one in 10 or 100 groups of 64
-cells, spread over the grid, and its time is multiplied by that number. Milliseconds are wall clock to the end of all work; processor milliseconds are those of
-all threads, so that they mean the same on a busy machine (on a GPU they mean nothing).
+lists, which is checked. Where brute force would take more than `--tests` tests, it builds one in 10 or 100 groups of
+64 cells, spread over the grid, and its time is multiplied by that number. Milliseconds are wall clock to the end of all
+work; processor milliseconds are those of all threads, so that they mean the same on a busy machine (on a GPU they mean
+nothing).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from vlm_addon.core.light_grid import light_shapes, make_frame
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
 from vlm_addon.core.scene import Float32, Float64
 from vlm_addon.render.device import Device
-from vlm_addon.render.passes.light_grid import GROUP_SIZE, LightGridPass, half_ball_records
+from vlm_addon.render.passes.light_grid import GROUP_SIZE, MOST_LIGHTS_PER_PART, LightGridPass, half_ball_records
 from vlm_addon.render.shader_library import set_uniforms
 from vlm_addon.terminal import table
 
@@ -145,14 +146,18 @@ def brute_force(device: Device, half_balls: HalfBalls, edges: Float32, max_light
     records = context.buffer(half_ball_records(half_balls).tobytes())
     faces = context.buffer(edges.tobytes())
     lists = context.buffer(reserve=4 * groups * GROUP_SIZE * max_lights)
-    for binding, buffer in enumerate((records, faces, lists)):
+    counts = context.buffer(reserve=4 * groups * GROUP_SIZE)
+    for binding, buffer in enumerate((records, faces, lists, counts)):
         buffer.bind_to_storage_buffer(binding)
     values = {"cells_per_axis": cells_per_axis, "light_count": len(half_balls), "max_lights": max_lights}
-    chunk = max(1, TESTS_PER_DISPATCH // (GROUP_SIZE * len(half_balls)))
-    for first in range(0, groups, chunk):
-        set_uniforms(shader, {**values, "group_step": part, "first_group": first})
-        shader.run(min(chunk, groups - first))
-        context.finish()
+    chunk = max(1, TESTS_PER_DISPATCH // (GROUP_SIZE * MOST_LIGHTS_PER_PART))
+    for first_light in range(0, len(half_balls), MOST_LIGHTS_PER_PART):
+        end_light = min(first_light + MOST_LIGHTS_PER_PART, len(half_balls))
+        values |= {"first_light": first_light, "end_light": end_light}
+        for first in range(0, groups, chunk):
+            set_uniforms(shader, {**values, "group_step": part, "first_group": first})
+            shader.run(min(chunk, groups - first))
+            context.finish()
     return lists
 
 

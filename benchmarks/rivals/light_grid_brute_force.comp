@@ -11,10 +11,13 @@ layout(std430, binding = 0) readonly buffer HalfBalls { HalfBall half_balls[]; }
 // Faces of the cells along x, then along y, then along z.
 layout(std430, binding = 1) readonly buffer Edges { float edges[]; };
 layout(std430, binding = 2) writeonly buffer Lists { uint lists[]; };
+layout(std430, binding = 3) buffer Counts { uint counts[]; };
 
 uniform uint cells_per_axis;
 uniform uint light_count;
 uniform uint max_lights;
+uniform uint first_light; // of this run: Mesa's llvmpipe ends an invocation's loops after 65,535 rounds in all
+uniform uint end_light;
 uniform uint group_step;
 uniform uint first_group;
 
@@ -29,15 +32,16 @@ void main() {
     vec3 low = vec3(edges[face.x], edges[face.y], edges[face.z]);
     vec3 high = vec3(edges[face.x + 1u], edges[face.y + 1u], edges[face.z + 1u]);
 
-    uint slot = (group * GROUP_SIZE + gl_LocalInvocationID.x) * max_lights;
-    uint count = 0u;
-    for (uint light = 0u; light < light_count && count < max_lights; ++light) {
+    uint slot = group * GROUP_SIZE + gl_LocalInvocationID.x;
+    uint count = first_light == 0u ? 0u : counts[slot];
+    for (uint light = first_light; light < end_light && count < max_lights; ++light) {
         if (half_ball_overlaps(half_balls[light], low, high)) {
-            lists[slot + count] = light;
+            lists[slot * max_lights + count] = light;
             ++count;
         }
     }
-    for (; count < max_lights; ++count) {
-        lists[slot + count] = light_count;
+    counts[slot] = count;
+    for (; end_light == light_count && count < max_lights; ++count) {
+        lists[slot * max_lights + count] = light_count;
     }
 }

@@ -31,11 +31,11 @@ bool may_overlap(HalfBall half_ball, vec3 low, vec3 high) {
     return squared_length(near) <= half_ball.radius_squared && height >= 0.0;
 }
 
-// The point clamp(t normal) of a box whose coordinates move from `near` on between the values `starts` and `stops` of t.
-vec3 point_at(float t, vec3 normal, vec3 low, vec3 high, vec3 near, vec3 starts, vec3 stops) {
+// The point clamp(t normal) of a box whose coordinates move between the values `starts` and `stops` of t.
+vec3 point_at(float t, vec3 normal, vec3 low, vec3 high, vec3 starts, vec3 stops) {
     precise vec3 along = t * normal;
     vec3 moving = max(low, min(high, along));
-    vec3 started = mix(moving, near, lessThanEqual(vec3(t), starts));
+    vec3 started = mix(moving, low, lessThan(vec3(t), starts));
     return mix(started, high, greaterThanEqual(vec3(t), stops));
 }
 
@@ -44,7 +44,6 @@ bool plane_overlaps(HalfBall half_ball, vec3 box_low, vec3 box_high) {
     bvec3 flipped = lessThan(half_ball.normal, vec3(0.0));
     vec3 low = mix(box_low, -box_high, flipped), high = mix(box_high, -box_low, flipped);
     vec3 normal = abs(half_ball.normal), inverse = abs(half_ball.inverse_normal);
-    vec3 near = max(low, min(high, vec3(0.0)));
     precise vec3 starts = max(low, vec3(0.0)) * inverse;
     precise vec3 stops = max(high, vec3(0.0)) * inverse;
 
@@ -52,8 +51,7 @@ bool plane_overlaps(HalfBall half_ball, vec3 box_low, vec3 box_high) {
     float bends[6] = float[6](starts.x, starts.y, starts.z, stops.x, stops.y, stops.z);
     for (int k = 0; k < 6; ++k) {
         float t = bends[k];
-        vec3 point = point_at(t, normal, low, high, near, starts, stops);
-        if (height_over_plane(normal, point) < 0.0) {
+        if (height_over_plane(normal, point_at(t, normal, low, high, starts, stops)) < 0.0) {
             last_below = max(last_below, t);
         } else {
             first_above = min(first_above, t);
@@ -62,14 +60,14 @@ bool plane_overlaps(HalfBall half_ball, vec3 box_low, vec3 box_high) {
 
     bvec3 stopped = greaterThanEqual(vec3(last_below), stops);
     bvec3 waiting = lessThanEqual(vec3(first_above), starts);
-    vec3 fixed_part = mix(mix(vec3(0.0), near, waiting), high, stopped);
+    vec3 fixed_part = mix(mix(vec3(0.0), low, waiting), high, stopped);
     vec3 moving_part = mix(mix(normal, vec3(0.0), waiting), vec3(0.0), stopped);
     float moving_squared = squared_length(moving_part);
     float offset = height_over_plane(normal, fixed_part);
     precise float room = half_ball.radius_squared - squared_length(fixed_part);
     precise float offset_squared = offset * offset;
     precise float allowed = room * moving_squared;
-    return offset == 0.0 ? room >= 0.0 : room > 0.0 && offset_squared <= allowed;
+    return (room > 0.0 && offset_squared <= allowed) || (room >= 0.0 && offset == 0.0);
 }
 
 // Whether the half ball and the closed box between two corners in the frame have a point in common.

@@ -71,13 +71,12 @@ def test_point_at(device):
     normal = np.abs(rng.normal(size=(COUNT, 3))).astype(np.float32)
     low = rng.normal(size=(COUNT, 3)).astype(np.float32)
     high = low + rng.exponential(size=(COUNT, 3)).astype(np.float32)
-    near = np.clip(0.0, low, high).astype(np.float32)
     starts, stops = np.maximum(low, 0) / normal, np.maximum(high, 0) / normal
     t = np.where(rng.random(COUNT) < 0.5, starts[:, 0], rng.exponential(size=COUNT)).astype(np.float32)
-    inputs = {"t": t, "normal": normal, "low": low, "high": high, "near": near, "starts": starts, "stops": stops}
-    found = evaluate(device, PATH, "point_at(t, normal, low, high, near, starts, stops)", inputs, 3)
+    inputs = {"t": t, "normal": normal, "low": low, "high": high, "starts": starts, "stops": stops}
+    found = evaluate(device, PATH, "point_at(t, normal, low, high, starts, stops)", inputs, 3)
     time = t[:, None]
-    expected = np.where(time >= stops, high, np.where(time <= starts, near, np.clip(time * normal, low, high)))
+    expected = np.where(time >= stops, high, np.where(time < starts, low, np.clip(time * normal, low, high)))
     assert np.array_equal(found, expected)
 
 

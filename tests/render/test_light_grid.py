@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.light_meshes import random_lights
+from tests.render.rooms import lights_from_triangles
 from vlm_addon.core.cell_lists import build_cell_lists
 from vlm_addon.core.errors import Cancelled, DeviceError
 from vlm_addon.core.light_grid import GridSettings, LightGrid, light_shapes, make_frame
@@ -62,6 +63,20 @@ def test_long_lists_are_looked_through_in_parts(build, cells):
     expected = LightGrid.bake(lights, BOX, GridSettings(cells, 6.0)).lists
     assert expected.counts.max() > 2 * light_grid.LEAST_LIGHTS_PER_PART
     assert_same(build(lights, cells, 6.0), expected)
+
+
+def test_lists_of_more_lights_than_a_loop_may_run(build):
+    # 70,000 times the same light: cells look through lists of all of them.
+    corners = np.tile(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]]), (70_000, 1, 1))
+    assert set(build(lights_from_triangles(corners), 2, 1e5).counts) == {70_000}
+
+
+def test_parts_are_short_enough_however_many_blocks():
+    for blocks in (1, 1000, 10**6):
+        for longest in (0, 100, 65_535, 10**6):
+            parts = light_grid._parts(blocks, longest)
+            assert parts >= 1
+            assert -(-longest // parts) <= light_grid.MOST_LIGHTS_PER_PART
 
 
 def test_no_lights_and_no_entries(build):

@@ -29,6 +29,8 @@ LEAST_RADIUS = 2.0**-30
 LARGEST = 2.0**30
 # Stands for 1 / 0: a plane along an axis is never left along it.
 INVERSE_OF_ZERO = 2.0**40
+# More than any length, position or parameter along a normal.
+_BEYOND = 2.0**100
 # Of the squared radius of a half ball without any point.
 NOTHING = -1.0
 
@@ -50,10 +52,11 @@ class HalfBalls:
 
     def take(self, rows: npt.NDArray[Any] | slice) -> HalfBalls:
         """Those of `rows`, in that order."""
+        rows = np.arange(len(self))[rows]
         return HalfBalls(
-            centres=self.centres[:, rows],
-            normals=self.normals[:, rows],
-            inverse_normals=self.inverse_normals[:, rows],
+            centres=np.take(self.centres, rows, axis=1),
+            normals=np.take(self.normals, rows, axis=1),
+            inverse_normals=np.take(self.inverse_normals, rows, axis=1),
             radii_squared=self.radii_squared[rows],
         )
 
@@ -95,7 +98,8 @@ def overlaps(half_balls: HalfBalls, low: Floats, high: Floats) -> Bools:
     far = np.maximum(-low, high)
     result |= reached & (_sum(far * far) <= radii_squared)
     doubtful = np.flatnonzero(reached & ~result)
-    result[doubtful] = _plane_overlaps(half_balls.take(doubtful), low[:, doubtful], high[:, doubtful])
+    low, high = np.take(low, doubtful, axis=1), np.take(high, doubtful, axis=1)
+    result[doubtful] = _plane_overlaps(half_balls.take(doubtful), low, high)
     return result
 
 
@@ -108,27 +112,28 @@ def _plane_overlaps(half_balls: HalfBalls, low: Floats, high: Floats) -> Bools:
 
     low, high: relative to the centre. The nearest point of the box in the plane is clamp(t n) for the t > 0 at which
     n clamp(t n) is 0 (the condition of Karush, Kuhn and Tucker). That sum rises with t and is linear between the
-    values of t at which a coordinate starts to move or stops.
+    values of t at which a coordinate starts to move or stops. Products with booleans stand for choices, which numpy
+    makes slowly.
     """
-    flipped = half_balls.normals < 0.0
-    low, high = np.where(flipped, -high, low), np.where(flipped, -low, high)
-    normals = np.abs(half_balls.normals)
-    near = np.maximum(low, np.minimum(high, 0.0))
-    inverses = np.abs(half_balls.inverse_normals)
+    signs = np.copysign(half_balls.normals.dtype.type(1.0), half_balls.normals)
+    low, high = np.minimum(low * signs, high * signs), np.maximum(low * signs, high * signs)
+    normals, inverses = np.abs(half_balls.normals), np.abs(half_balls.inverse_normals)
     starts, stops = np.maximum(low, 0.0) * inverses, np.maximum(high, 0.0) * inverses
+    beyond = normals.dtype.type(_BEYOND)
 
-    last_below, first_above = np.zeros_like(low[0]), np.full_like(low[0], np.inf)
+    last_below, first_above = np.zeros_like(low[0]), np.full_like(low[0], _BEYOND)
     for t in (*starts, *stops):
-        moving = np.maximum(low, np.minimum(high, t * normals))
-        point = np.where(t >= stops, high, np.where(t <= starts, near, moving))
-        below = _sum(normals * point) < 0.0
-        last_below = np.where(below, np.maximum(last_below, t), last_below)
-        first_above = np.where(below, first_above, np.minimum(first_above, t))
+        along = t * normals + beyond * (t >= stops) - beyond * (t < starts)
+        below = _sum(normals * np.maximum(low, np.minimum(high, along))) < 0.0
+        last_below = np.maximum(last_below, t * below)
+        first_above = np.minimum(first_above, np.maximum(t, beyond * below))
 
-    stopped, waiting = last_below >= stops, first_above <= starts
-    fixed = np.where(stopped, high, np.where(waiting, near, 0.0))
-    moving_squared = _sum(np.where(stopped | waiting, 0.0, normals * normals))
+    stopped = last_below >= stops
+    waiting = (first_above <= starts) & ~stopped
+    fixed = high * stopped + low * waiting
+    moving_squared = _sum(normals * normals * ~(stopped | waiting))
     # With t = -offset / moving_squared: distance² = |fixed|² + offset² / moving_squared.
     offset = _sum(normals * fixed)
     room = half_balls.radii_squared - _sum(fixed * fixed)
-    return np.asarray(np.where(offset == 0.0, room >= 0.0, (room > 0.0) & (offset * offset <= room * moving_squared)))
+    within = (room > 0.0) & (offset * offset <= room * moving_squared)
+    return np.asarray(within | ((room >= 0.0) & (offset == 0.0)))

@@ -26,9 +26,11 @@ _SLACK = 1e-6
 # Under this component of the normal along a row, the plane does not bound the row.
 _LEAST_SLOPE = 1e-3
 # Of a place along an axis, in cells: some roundings at MAX_CELLS_PER_AXIS.
-_COLUMN_ROUNDING = 1e-4
+_COLUMN_ROUNDING = np.float32(1e-4)
+# More than any place in the frame.
+_BEYOND = np.float32(2.0**100)
 # Rows of cells that are looked at at once: their arrays stay in a core's cache.
-_ROWS_PER_BLOCK = 1 << 15
+_ROWS_PER_BLOCK = 1 << 16
 _THREADS = 2
 
 Ints = npt.NDArray[Any]
@@ -153,19 +155,20 @@ def _slab(half_balls: HalfBalls, edges: Float32, k: int, lights: Ints) -> tuple[
     row_counts = np.maximum(last_rows - first_rows + 1, 0)
     groups = np.cumsum(row_counts) // _ROWS_PER_BLOCK
     blocks = np.split(np.arange(len(lights)), np.flatnonzero(np.diff(groups)) + 1)
-    pairs = [
-        _pairs(chosen.take(block), edges, k, first_rows[block], row_counts[block], lights[block]) for block in blocks
-    ]
+    pairs = []
+    for block in blocks:
+        members = chosen.take(block)
+        runs = _runs(members, edges, k, first_rows[block], row_counts[block])
+        pairs.append(_pairs(members, edges, k, runs, lights[block]))
     cells, slab_lights = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     order = np.argsort(cells, kind="stable")
     return np.bincount(cells, minlength=per_axis * per_axis), slab_lights[order]
 
 
 def _pairs(
-    half_balls: HalfBalls, edges: Float32, k: int, first_rows: Ints, row_counts: Ints, lights: Ints
+    half_balls: HalfBalls, edges: Float32, k: int, runs: _Runs, lights: Ints
 ) -> tuple[Ints, npt.NDArray[np.uint32]]:
     """Cells of slab k and the lights that reach them, by light: every pair once."""
-    runs = _runs(half_balls, edges, k, first_rows, row_counts)
     counts = runs.last - runs.first + 1
     starts = np.cumsum(counts) - counts
     cells = expand(runs.rows * (edges.shape[1] - 1) + runs.first, counts).astype(np.uint16)
@@ -190,41 +193,60 @@ def _cells_overlap(half_balls: HalfBalls, edges: Float32, k: int, cells: Ints) -
 
 
 def _runs(half_balls: HalfBalls, edges: Float32, k: int, first_rows: Ints, row_counts: Ints) -> _Runs:
-    """The runs of slab k, by light; row_counts rows of each light from first_rows on are looked at."""
-    lights = np.repeat(np.arange(len(half_balls)), row_counts)
+    """The runs of slab k, by light; row_counts rows of each light from first_rows on are looked at.
+
+    A run may be reached where ball and row, and half space and row, overlap. It is reached for certain where a cell's
+    near point is in both. Both sets are parts of the row; `slack` is subtracted from the one and added to the other.
+    """
+    (cx, cy, cz), (nx, ny, nz) = half_balls.centres, half_balls.normals
+    low_z, high_z = edges[2, k] - cz, edges[2, k + 1] - cz
+    near_z = np.maximum(low_z, np.minimum(high_z, 0.0))
+    slack_z = _SLACK * (np.abs(cx) + np.maximum(-low_z, high_z))
+    lift_z, near_lift_z = np.maximum(nz * low_z, nz * high_z), nz * near_z
+    spread = _SLACK * half_balls.radii_squared
+    room_z = half_balls.radii_squared - near_z * near_z
+    rises, falls = nx > _LEAST_SLOPE, nx < -_LEAST_SLOPE
+    slope = np.abs(nx)
+    # Where the plane crosses the row at a height of `lift`: -lift * inverse, or beyond the row's ends.
+    inverse = half_balls.inverse_normals[0]
+    rising, falling = inverse * rises, inverse * falls
+    low_end, high_end = -_BEYOND * ~rises, _BEYOND * ~falls
+
+    def spread_out(*per_light: Floats) -> list[Floats]:
+        return [np.repeat(values, row_counts) for values in per_light]
+
+    cx, cy, ny, slack, lift, near_lift, spread, room, slope, rising, falling, low_end, high_end = spread_out(
+        cx, cy, ny, slack_z, lift_z, near_lift_z, spread, room_z, slope, rising, falling, low_end, high_end
+    )
     rows = expand(first_rows, row_counts)
-    (cx, cy, cz), (nx, ny, nz) = half_balls.centres[:, lights], half_balls.normals[:, lights]
-    radii_squared = half_balls.radii_squared[lights]
-    low_y, high_y, low_z, high_z = edges[1, rows] - cy, edges[1, rows + 1] - cy, edges[2, k] - cz, edges[2, k + 1] - cz
-    near_y, near_z = (np.maximum(low, np.minimum(high, 0.0)) for low, high in ((low_y, high_y), (low_z, high_z)))
-    across_squared = near_y * near_y + near_z * near_z
-
-    room = radii_squared * (1.0 + _SLACK) - across_squared
-    reach = np.sqrt(np.maximum(room, 0.0))
-    slack = _SLACK * (np.abs(cx) + np.maximum(-low_y, high_y) + np.maximum(-low_z, high_z) + reach)
-    # The most that y and z add to the height over the light's plane in this row.
-    lift = np.maximum(ny * low_y, ny * high_y) + np.maximum(nz * low_z, nz * high_z) + slack
-    low, high, _ = _lit_part(nx, lift, reach)
+    low_y, high_y = edges[1][rows] - cy, edges[1][rows + 1] - cy
+    near_y = np.maximum(low_y, np.minimum(high_y, 0.0))
+    room = room - near_y * near_y
+    reach = np.sqrt(np.maximum(room + spread, 0.0))
+    slack = slack + _SLACK * (np.maximum(-low_y, high_y) + reach)
+    lift = lift + np.maximum(ny * low_y, ny * high_y) + slack
     columns = _Columns(edges[0])
-    first, last = columns.of(cx + low - slack, -1.0), columns.of(cx + high + slack, 1.0)
-    reached = (room >= 0.0) & (lift + np.abs(nx) * reach >= 0.0) & (low <= high + slack)
-    first, last = np.maximum(first, 0), np.minimum(last, columns.count - 1)
-    reached &= first <= last
+    low, high = np.maximum(low_end - lift * rising, -reach), np.minimum(high_end - lift * falling, reach)
+    first = np.maximum(columns.of(cx + low - slack, -1.0), 0)
+    last = np.minimum(columns.of(cx + high + slack, 1.0), columns.count - 1)
+    reached = (room + spread >= 0.0) & (lift + slope * reach >= 0.0) & (low <= high + slack) & (first <= last)
 
-    sure_room = radii_squared * (1.0 - _SLACK) - across_squared
-    sure_reach = np.sqrt(np.maximum(sure_room, 0.0)) - slack
-    near_lift = ny * near_y + nz * near_z - slack
-    low, high, crossing = _lit_part(nx, near_lift, sure_reach)
-    sure_first, sure_last = columns.of(cx + low + slack, 1.0), columns.of(cx + high - slack, -1.0)
+    near_lift = near_lift + ny * near_y - slack
+    sure_reach = np.sqrt(np.maximum(room - spread, 0.0)) - slack
+    low_crossing, high_crossing = low_end - near_lift * rising, high_end - near_lift * falling
+    low, high = np.maximum(low_crossing, -sure_reach), np.minimum(high_crossing, sure_reach)
     # A cell's near point is its end towards the centre, which must be on the lit side of the crossing.
-    sure_first += (nx > _LEAST_SLOPE) & (crossing > 0.0)
-    sure_last -= (nx < -_LEAST_SLOPE) & (crossing < 0.0)
+    sure_first = columns.of(cx + low + slack, 1.0) + (low_crossing > 0.0)
+    sure_last = columns.of(cx + high - slack, -1.0) - (high_crossing < 0.0)
     sure_first, sure_last = np.maximum(sure_first, first), np.minimum(sure_last, last)
-    flat = (np.abs(nx) <= _LEAST_SLOPE) & (near_lift < np.abs(nx) * reach)
-    narrow = high - low <= 2.0 * (slack + columns.doubt)
-    unsure = flat | (sure_room <= 0.0) | narrow | (sure_first > sure_last)
-    sure_first, sure_last = np.where(unsure, last + 1, sure_first), np.where(unsure, last, sure_last)
-    return _Runs(*(values[reached] for values in (lights, rows, first, last, sure_first, sure_last)))
+    sure = (slope > _LEAST_SLOPE) | (near_lift >= slope * reach)
+    sure &= (room > spread) & (high - low > 2.0 * (slack + columns.doubt)) & (sure_first <= sure_last)
+    sure_first = np.minimum(np.maximum(sure_first, (last + 1) * ~sure), last + 1)
+    sure_last = np.maximum(sure_last, last * ~sure)
+
+    kept = np.flatnonzero(reached)
+    lights = np.repeat(np.arange(len(half_balls)), row_counts)
+    return _Runs(*(np.take(values, kept) for values in (lights, rows, first, last, sure_first, sure_last)))
 
 
 class _Columns:
@@ -233,23 +255,13 @@ class _Columns:
     def __init__(self, edges: Float32) -> None:
         self.count = len(edges) - 1
         self._start = edges[0]
-        self._per_unit = self.count / (edges[-1] - edges[0])
-        widths = np.linspace(0.0, self.count, len(edges))
-        off = np.abs((edges - self._start) * self._per_unit - widths).max() + _COLUMN_ROUNDING
-        self._doubt_in_cells = np.float32(off)
-        self.doubt = np.float32(off / self._per_unit)
+        self._per_unit = np.float32(self.count) / (edges[-1] - edges[0])
+        places = (edges - self._start) * self._per_unit
+        self._doubt_in_cells = np.abs(places - np.arange(len(edges), dtype=np.float32)).max() + _COLUMN_ROUNDING
+        self.doubt = self._doubt_in_cells / self._per_unit
         """How far, in the frame, a place may be from where it seems to be among the cells."""
 
     def of(self, places: Floats, towards: float) -> Ints:
         """int32 cell of each place, rounded up (towards 1) or down (-1) in doubt; -1 and `count` beyond the ends."""
-        cells = (places - self._start) * self._per_unit + towards * self._doubt_in_cells
+        cells = (places - self._start) * self._per_unit + np.float32(towards) * self._doubt_in_cells
         return np.floor(np.clip(cells, -1.0, self.count)).astype(np.int32)
-
-
-def _lit_part(nx: Floats, lift: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ends of the part of [-reach, reach] in which nx x + lift >= 0 unless nx is small, and the x where it is 0."""
-    steep = np.abs(nx) > _LEAST_SLOPE
-    crossing = -lift / np.where(steep, nx, 1.0)
-    low = np.where(steep & (nx > 0.0), np.maximum(crossing, -reach), -reach)
-    high = np.where(steep & (nx < 0.0), np.minimum(crossing, reach), reach)
-    return low, high, crossing

@@ -31,6 +31,8 @@ BRANCHING = 4
 # Invocations that keep a large device busy: long lists of few blocks are shared among several.
 ENOUGH_INVOCATIONS = 1 << 16
 LEAST_LIGHTS_PER_PART = 64
+# Mesa's llvmpipe ends an invocation's loops after 65,535 rounds in all, without a word.
+MOST_LIGHTS_PER_PART = 1 << 15
 # Invocations in one dispatch, so that a software renderer hears of a cancellation.
 INVOCATIONS_PER_DISPATCH = 1 << 18
 MAX_GROUPS_PER_AXIS = 65535
@@ -275,7 +277,8 @@ def _sides(cells_per_axis: int) -> Iterator[int]:
 
 def _parts(blocks: int, longest: int) -> int:
     """Into how many parts the lists that blocks look through are cut."""
-    return max(1, min(ENOUGH_INVOCATIONS // blocks, longest // LEAST_LIGHTS_PER_PART))
+    wanted = min(ENOUGH_INVOCATIONS // blocks, longest // LEAST_LIGHTS_PER_PART)
+    return max(1, wanted, -(-longest // MOST_LIGHTS_PER_PART))
 
 
 def _ranges(offsets: npt.NDArray[np.uint32], most: int) -> Iterator[tuple[int, int]]:
