@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Building the light grid: the thesis's brute force against ours, on the device and on the processor.
+"""Building the light grid of the atrium: the thesis's brute force against ours, on the device and on the processor.
 
-`./dev bench light_grid [lights …] [--grid n …]` prints a table like the thesis's table 5.2. All three build the same
-lists, which is checked. Where brute force would take more than `--tests` tests, it builds one in 10 or 100 groups of
-64 cells, spread over the grid, and its time is multiplied by that number. Milliseconds are wall clock to the end of all
-work; processor milliseconds are those of all threads, so that they mean the same on a busy machine (on a GPU they mean
-nothing).
+`./dev bench light_grid [lights …] [--grid n …] [--range r]` prints a table like the thesis's table 5.2. All three build
+the same lists, which is checked. Where brute force would take more than `--tests` tests, it builds one in 10 or 100
+groups of 64 cells, spread over the grid, and its time is multiplied by that number. Milliseconds are wall clock to the
+end of all work; processor milliseconds are those of all threads, so that they mean the same on a busy machine (on a GPU
+they mean nothing).
 """
 
 from __future__ import annotations
@@ -18,26 +18,25 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.support import open_sample
 from vlm_addon.core.active_hemisphere import HalfBalls
 from vlm_addon.core.cell_lists import CellLists, build_cell_lists
 from vlm_addon.core.light_grid import light_shapes, make_frame
-from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
-from vlm_addon.core.scene import Float32, Float64
+from vlm_addon.core.scene import Float32
+from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.render.device import Device
 from vlm_addon.render.passes.light_grid import GROUP_SIZE, MOST_LIGHTS_PER_PART, LightGridPass, half_ball_records
 from vlm_addon.render.shader_library import set_uniforms
 from vlm_addon.terminal import table
 
 BRUTE_FORCE = "../benchmarks/rivals/light_grid_brute_force.comp"
+SCENE = "atrium"
 RANGE = 4.0
-LIGHTS, GRIDS = (10_000, 100_000), (10, 20, 40, 60, 100)
+LIGHTS, GRIDS = (10_000, 100_000), (10, 20, 40, 100)
 MOST_TESTS = 1_000_000_000
 PARTS = (1, 10, 100, 1000)
 # A dispatch of so many tests ends within some seconds on two cores.
 TESTS_PER_DISPATCH = 400_000_000
-
-HALL = np.array([30.0, 12.0, 18.0])
-COLUMN_RADIUS, COLUMNS = 0.5, (8, 2)
 
 THESIS_MS = {
     10_000: {10: 1.18, 20: 9.82, 30: 33.73, 40: 80.24, 50: 155.63, 60: 269.67, 70: 428.74, 80: 638.51, 90: 908.59,
@@ -81,30 +80,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("lights", nargs="*", type=int, default=LIGHTS)
     parser.add_argument("--grid", nargs="+", type=int, default=GRIDS)
+    parser.add_argument("--range", type=float, default=RANGE)
     parser.add_argument("--tests", type=float, default=MOST_TESTS, help="most tests that brute force may take")
     options = parser.parse_args()
+    snapshot = open_sample(SCENE).snapshot
+    rows = []
     with Device() as device, device.current():
-        print(f"{device.name}, range {RANGE:g}")
-        rows = [row(device, lights, cells, options.tests) for lights in options.lights for cells in options.grid]
-        print(table(HEADER, rows))
+        for lights in options.lights:
+            light_mesh = create_light_mesh(snapshot.meshes, SimplifySettings(lights, 1)).light_mesh
+            for cells in options.grid:
+                frame = make_frame(snapshot.bounds(), cells)
+                half_balls = light_shapes(light_mesh, frame, options.range).half_balls
+                rows.append(row(device, half_balls, frame.edges, options.tests))
+        print(f"{device.name}, {SCENE}, range {options.range:g}")
+    print(table(HEADER, rows))
 
 
-def row(device: Device, lights: int, cells: int, most_tests: float) -> tuple[str, ...]:
+def row(device: Device, half_balls: HalfBalls, edges: Float32, most_tests: float) -> tuple[str, ...]:
     """One line of the table."""
-    light_mesh = hall_lights(lights)
-    frame = make_frame((np.zeros(3), HALL), cells)
-    half_balls = light_shapes(light_mesh, frame, RANGE).half_balls
+    lights, cells = len(half_balls), edges.shape[1] - 1
     builder = LightGridPass(device.context, device.shaders)
     # Once before it is timed: the first run compiles shaders.
-    small = make_frame((np.zeros(3), HALL), 2)
-    builder.build_lists(half_balls.take(slice(0, 10)), small.edges)
-    shaders = timed(device, lambda: builder.build_lists(half_balls, frame.edges))
-    numpy_path = timed(device, lambda: build_cell_lists(half_balls, frame.edges))
+    builder.build_lists(half_balls.take(slice(0, 10)), edges[:, ::cells])
+    shaders = timed(device, lambda: builder.build_lists(half_balls, edges))
+    numpy_path = timed(device, lambda: build_cell_lists(half_balls, edges))
     lists: CellLists = numpy_path.result
     counts = lists.counts
     fullest = int(counts.max())
     part = next((part for part in PARTS if cells**3 * lights / part <= most_tests), PARTS[-1])
-    brute = timed(device, lambda: brute_force(device, half_balls, frame.edges, fullest, part))
+    brute = timed(device, lambda: brute_force(device, half_balls, edges, fullest, part))
     require_same(lists, shaders.result, brute.result, part)
     fixed = 4e-6 * cells**3 * fullest
     thesis = THESIS_MS.get(lights, {}).get(cells)
@@ -175,60 +179,6 @@ def require_same(lists: CellLists, by_shaders: CellLists, brute_buffer: Any, par
     expected = lists.light_ids[(starts[:, None] + np.arange(fullest))[filled]]
     if not (same and np.array_equal(found[filled], expected) and (found[~filled] > lists.light_ids.max()).all()):
         raise SystemExit("the ways to build a grid differ")
-
-
-def hall_lights(count: int) -> VirtualLightMesh:
-    """`count` triangles of about one size on walls, floor, ceiling and columns of a hall, turned at random."""
-    rng = np.random.default_rng(count)
-    points, normals, area = hall_surface(rng, count)
-    tangents = np.cross(normals, np.where(np.abs(normals[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    angles = rng.uniform(0.0, 2.0 * np.pi, (count, 1)) + np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
-    angles += rng.uniform(-0.5, 0.5, angles.shape)
-    # A regular triangle of circumradius r has an area of 1.3 r².
-    radii = np.sqrt(area / count / 1.3) * rng.uniform(0.7, 1.3, (count, 1))
-    along, across = (radii * np.cos(angles))[..., None], (radii * np.sin(angles))[..., None]
-    corners = points[:, None] + along * tangents[:, None] + across * np.cross(normals, tangents)[:, None]
-    return _light_mesh(corners)
-
-
-def hall_surface(rng: np.random.Generator, count: int) -> tuple[Float64, Float64, float]:
-    """(count, 3) random points on the hall's surfaces, their normals, and the area of all surfaces in m²."""
-    sides = np.array([HALL[1] * HALL[2], HALL[0] * HALL[2], HALL[0] * HALL[1]])
-    column = 2.0 * np.pi * COLUMN_RADIUS * HALL[1]
-    areas = np.concatenate((sides, sides, [column * np.prod(COLUMNS)]))
-    kinds = rng.choice(7, count, p=areas / areas.sum())
-    points = rng.uniform(0.0, 1.0, (count, 3)) * HALL
-    normals = np.zeros((count, 3))
-    for kind in range(6):
-        axis, chosen = kind % 3, kinds == kind
-        points[chosen, axis] = HALL[axis] if kind >= 3 else 0.0
-        normals[chosen, axis] = -1.0 if kind >= 3 else 1.0
-    chosen = kinds == 6
-    angles = rng.uniform(0.0, 2.0 * np.pi, chosen.sum())
-    around = np.stack((np.cos(angles), np.zeros_like(angles), np.sin(angles)), axis=1)
-    places = np.stack([(rng.integers(0, n, chosen.sum()) + 0.5) / n for n in COLUMNS])
-    points[chosen, 0], points[chosen, 2] = places[0] * HALL[0], (0.25 + 0.5 * places[1]) * HALL[2]
-    points[chosen] += COLUMN_RADIUS * around
-    normals[chosen] = around
-    return points, normals, float(areas.sum())
-
-
-def _light_mesh(corners: Float64) -> VirtualLightMesh:
-    count = len(corners)
-    samples = SourceSamples(
-        corners.mean(axis=1), np.zeros((count, 3), np.float32), np.ones(count, np.float32), np.arange(count + 1)
-    )
-    return VirtualLightMesh(
-        vertices=corners.reshape(-1, 3),
-        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
-        colour=np.ones((count, 3), np.float32),
-        emission=np.zeros((count, 3), np.float32),
-        strength=np.ones(count, np.float32),
-        tag_ids=np.zeros(count, np.int32),
-        dynamic=np.zeros(count, bool),
-        samples=samples,
-    )
 
 
 if __name__ == "__main__":
