@@ -120,6 +120,12 @@ float unit_scale(float radius) {
     return uintBitsToFloat((251u << 23) - (floatBitsToUint(radius) & 0x7f800000u));
 }
 
+// Most that a polygon can give: between its plane and the horizon a lune of the hemisphere is left. Where the polygon
+// faces as the surface does that is little; in its plane, where rounded edges may wind around the point, nothing.
+float most_form_factor(vec3 n, vec3 area) {
+    return max(0.5 - 0.5 * dot(n, area) * inversesqrt(max(dot(area, area), 1e-37)), 0.0);
+}
+
 // Share of the hemisphere over p with normal n that a triangle fills, cosine-weighted, clipped at the horizon; in
 // [0, 1], exactly 0 behind the triangle and where it is wholly below the horizon.
 // p, v0, v1, v2: m. n: unit. area_vector: m², area times normal on the emitting (counter-clockwise) side, stored with
@@ -129,7 +135,8 @@ float triangle_form_factor(
 ) {
     float scale = unit_scale(bounding_radius);
     vec3 a = (v0 - p) * scale, b = (v1 - p) * scale, c = (v2 - p) * scale;
-    float plane_distance_area = -dot(area_vector * scale * scale, a);
+    vec3 area = area_vector * scale * scale;
+    float plane_distance_area = -dot(area, a);
     vec3 heights = vec3(dot(n, a), dot(n, b), dot(n, c));
     // Written so that NaN, of lights without size, gives 0.
     if (!(plane_distance_area > 0.0) || max(max(heights.x, heights.y), heights.z) <= 0.0) {
@@ -147,7 +154,7 @@ float triangle_form_factor(
     float sum = horizon_arc(q2, q3, n) + edge_irradiance(q1, q0, lengths.y, lengths.x, products.x, n)
         + edge_irradiance(q2, q1, lengths.z, lengths.y, products.y, n)
         + edge_irradiance(q0, q3, lengths.x, lengths.w, products.w, n);
-    return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);
+    return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, most_form_factor(n, area));
 }
 
 // The same for a triangle whose bounding radius is not stored.

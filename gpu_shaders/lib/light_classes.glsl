@@ -61,6 +61,7 @@ float whole_form_factor(
     float scale = unit_scale(bounding_radius);
     vec3 a = (v0 - p) * scale, b = (v1 - p) * scale, c = (v2 - p) * scale;
     float sum = edge_irradiance(b, a, n) + edge_irradiance(c, b, n) + edge_irradiance(a, c, n);
-    return dot(area_vector, a) < 0.0 ? clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0) : 0.0;
+    vec3 area = area_vector * scale * scale;
+    return dot(area, a) < 0.0 ? clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, most_form_factor(n, area)) : 0.0;
 }
 #endif

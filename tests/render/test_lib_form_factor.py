@@ -177,6 +177,25 @@ def split(triangles: Array) -> Array:
     return np.array([np.stack(part, axis=1) for part in ([a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca])])
 
 
+@pytest.mark.parametrize("lean", [0.0, 1e-6, 1e-3])
+def test_light_in_the_plane_of_the_surface_gives_nothing(device: Device, lean: float) -> None:
+    """Lights drawn on the surface that they stand for, in any plane: only rounding lifts them over its horizon."""
+    random = np.random.default_rng(21)
+    count = 100_000
+    normals = unit(random.normal(size=(count, 3)))
+    right = unit(np.cross(normals, random.normal(size=(count, 3))))
+    axes = np.stack([right, np.cross(normals, right)], axis=1)
+    centres = random.uniform(-15.0, 15.0, (count, 1, 3))
+    flat = random.uniform(-1.0, 1.0, (count, 3, 2))
+    doubled = np.linalg.det(flat[:, 1:] - flat[:, :1])
+    flat[doubled < 0.0] = flat[doubled < 0.0][:, ::-1]
+    triangles = centres + np.einsum("nkd,ndc->nkc", flat, axes)
+    points = (centres + np.einsum("nkd,ndc->nkc", random.uniform(-1.5, 1.5, (count, 1, 2)), axes))[:, 0]
+    leaning = unit(normals + lean * random.normal(size=(count, 3)))
+    # A lune between two planes that differ by so much is lean² / 4 of the hemisphere; 6 is far in the tail of `normal`.
+    assert shader(device, points, leaning, triangles).max() < 1e-6 + (6.0 * lean) ** 2 / 4.0
+
+
 @pytest.mark.parametrize("distance", [0.5, 1.5, 20.0])
 def test_splitting_a_triangle_leaves_the_sum(device: Device, distance: float) -> None:
     points, normals, triangles = random_case(distance)
@@ -413,6 +432,19 @@ def test_midpoint_mean_is_exact_for_quadratic_functions(device: Device) -> None:
     heights, inverse = single([[1.0, 1.0, 0.0]]), np.sqrt(single([[1.0, 1.0, 0.0]]))
     (value,) = evaluate(device, PATH, "midpoint_mean(h, i)", {"h": heights, "i": inverse})
     assert value == pytest.approx(8.0 * 2.0 / 3.0)
+
+
+def test_most_form_factor(device: Device) -> None:
+    """A half space of light seen from its own boundary: (1 - cos of the angle between the normals) / 2."""
+    angles = np.linspace(0.0, PI, 50)
+    normals = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
+    area = np.tile([0.0, 0.0, 3.0], (len(angles), 1))
+    values = evaluate(device, PATH, "most_form_factor(n, v)", {"n": normals, "v": area})
+    np.testing.assert_allclose(values, (1.0 - np.cos(angles)) / 2.0, atol=2e-7)
+    huge = 1e6 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    points = np.tile([0.0, 0.0, 1e-3], (len(angles), 1))
+    touching = paired_form_factor(points, normals, np.broadcast_to(huge, (len(angles), 4, 3)))
+    np.testing.assert_allclose(values, touching, atol=1e-6)
 
 
 def test_unit_scale(device: Device) -> None:
