@@ -29,8 +29,8 @@ _LEAST_SLOPE = 1e-3
 _COLUMN_ROUNDING = np.float32(1e-4)
 # More than any place in the frame.
 _BEYOND = np.float32(2.0**100)
-# Rows of cells that are looked at at once: their arrays stay in a core's cache.
-_ROWS_PER_BLOCK = 1 << 16
+# Runs of cells in a row that are looked at at once: they and their cells stay in a core's cache.
+_RUNS_PER_BAND = 1 << 14
 _THREADS = 2
 
 Ints = npt.NDArray[Any]
@@ -152,22 +152,35 @@ def _slab(half_balls: HalfBalls, edges: Float32, k: int, lights: Ints) -> tuple[
     per_axis = edges.shape[1] - 1
     chosen = half_balls.take(lights)
     first_rows, last_rows = _axis_range(chosen, edges, 1)
-    row_counts = np.maximum(last_rows - first_rows + 1, 0)
-    groups = np.cumsum(row_counts) // _ROWS_PER_BLOCK
-    blocks = np.split(np.arange(len(lights)), np.flatnonzero(np.diff(groups)) + 1)
-    pairs = []
-    for block in blocks:
-        members = chosen.take(block)
-        runs = _runs(members, edges, k, first_rows[block], row_counts[block])
-        pairs.append(_pairs(members, edges, k, runs, lights[block]))
-    cells, slab_lights = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    order = np.argsort(cells, kind="stable")
-    return np.bincount(cells, minlength=per_axis * per_axis), slab_lights[order]
+    parts = []
+    for first_row, end_row in _bands(first_rows, last_rows, per_axis):
+        starts = np.maximum(first_rows, first_row)
+        row_counts = np.minimum(last_rows, end_row - 1) - starts + 1
+        members = np.flatnonzero(row_counts > 0)
+        band_balls = chosen.take(members)
+        runs = _runs(band_balls, edges, k, starts[members], row_counts[members])
+        cells, cell_lights = _pairs(band_balls, edges, k, runs, lights[members])
+        cells -= first_row * per_axis
+        cell_count = (end_row - first_row) * per_axis
+        order = np.argsort(cells.astype(np.uint8) if cell_count <= 256 else cells, kind="stable")
+        parts.append((np.bincount(cells, minlength=cell_count), cell_lights[order]))
+    counts, light_ids = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return counts, light_ids
+
+
+def _bands(first_rows: Ints, last_rows: Ints, row_count: int) -> list[tuple[int, int]]:
+    """First row and end of bands of rows that hold some _RUNS_PER_BAND runs each, all rows of a slab together."""
+    reached = first_rows <= last_rows
+    changes = np.bincount(first_rows[reached], minlength=row_count + 1)
+    changes -= np.bincount(last_rows[reached] + 1, minlength=row_count + 1)
+    runs_before = np.cumsum(np.cumsum(changes[:row_count])) // _RUNS_PER_BAND
+    starts = [0, *(np.flatnonzero(np.diff(runs_before)) + 1).tolist()]
+    return list(zip(starts, [*starts[1:], row_count], strict=True))
 
 
 def _pairs(
     half_balls: HalfBalls, edges: Float32, k: int, runs: _Runs, lights: Ints
-) -> tuple[Ints, npt.NDArray[np.uint32]]:
+) -> tuple[npt.NDArray[np.uint16], npt.NDArray[np.uint32]]:
     """Cells of slab k and the lights that reach them, by light: every pair once."""
     counts = runs.last - runs.first + 1
     starts = np.cumsum(counts) - counts
