@@ -118,9 +118,7 @@ def test_points_on_the_bounds_are_inside():
 def test_lights_without_area_and_lights_not_chosen_are_in_no_cell():
     corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]] * 3, float)
     corners[1, 2] = corners[1, 1]
-    grid = LightGrid.bake(
-        lights_from_triangles(corners), BOX, GridSettings(3, 2.0), chosen=np.array([1, 1, 0], bool)
-    )
+    grid = LightGrid.bake(lights_from_triangles(corners), BOX, GridSettings(3, 2.0), chosen=np.array([1, 1, 0], bool))
     assert set(grid.lists.light_ids) == {0}
 
 
@@ -170,7 +168,9 @@ def test_a_full_cell_keeps_the_lights_that_may_give_it_most():
     assert np.array_equal(after.sum(axis=1), np.minimum(before.sum(axis=1), limit))
     for cell in np.flatnonzero(before.sum(axis=1) > limit):
         same = np.full(120, cell)
-        bounds = form_factor_bounds(shapes.half_balls, shapes.areas, shapes.radii, free.frame.edges, same)
+        bounds = form_factor_bounds(shapes.half_balls, shapes.areas, shapes.radii, free.frame.edges, same).astype(
+            np.float32
+        )
         dropped = before[cell] & ~after[cell]
         assert bounds[dropped].max() <= bounds[after[cell]].min()
     occupancy = full.occupancy
@@ -182,6 +182,13 @@ def test_a_full_cell_keeps_the_lights_that_may_give_it_most():
     assert occupancy.dropped_lights.tolist() == np.flatnonzero(lost).tolist()
     assert "overflow" in occupancy.summary()
     assert "nothing dropped" in free.occupancy.summary()
+
+
+def test_of_equal_lights_a_full_cell_keeps_the_first():
+    corners = np.tile(np.eye(3), (9, 1, 1))
+    grid = LightGrid.bake(lights_from_triangles(corners), BOX, GridSettings(2, 50.0, 4))
+    assert set(grid.lists.light_ids) == {0, 1, 2, 3}
+    assert grid.occupancy.dropped_lights.tolist() == [4, 5, 6, 7, 8]
 
 
 def test_no_point_of_a_cell_gets_more_than_the_bound():

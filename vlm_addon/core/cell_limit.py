@@ -11,9 +11,15 @@ import numpy.typing as npt
 
 from .active_hemisphere import HalfBalls
 from .cell_lists import CellLists, expand, lists_from_counts
+from .errors import InvalidInput
 from .scene import Float32, Float64
 
-_ENTRIES_PER_BLOCK = 1 << 20
+Ints = npt.NDArray[Any]
+
+_ENTRIES_PER_BLOCK = 1 << 18
+# A sort key of 64 bits holds which cell of a block (11 bits), a float32 and a place in the cell's list.
+_CELLS_PER_BLOCK = 1 << 11
+_RANK_BITS = 21
 
 
 @dataclass(frozen=True)
@@ -56,24 +62,28 @@ def limited(
     """`lists` with at most `max_lights` lights a cell (0: any number), and what that leaves out.
 
     A full cell keeps the lights of the greatest bound on their form factor in it, the lower id where bounds are
-    equal. areas, radii: (n,) area and bounding radius of each light, in the grid's frame.
+    equal as float32. areas, radii: (n,) area and bounding radius of each light, in the grid's frame.
+    Raises InvalidInput where more lights reach one cell than can be ranked, some two million.
     """
     counts = lists.counts
     fullest = int(counts.max(initial=0))
+    if max_lights and fullest >= 1 << _RANK_BITS:
+        raise InvalidInput(
+            "light grid", f"{fullest:,} lights reach one cell", "use a shorter range or no greatest list"
+        )
     overflowing = np.flatnonzero(counts > max_lights) if max_lights else np.zeros(0, np.int64)
     dropped = np.zeros(len(half_balls), np.uint32)
     keep = np.ones(len(lists.light_ids), bool) if len(overflowing) else np.zeros(0, bool)
     for cells in _blocks(overflowing, counts):
-        positions = expand(lists.offsets[cells].astype(np.int64), counts[cells])
+        starts = lists.offsets[cells].astype(np.int64)
+        positions = expand(starts, counts[cells])
         lights = lists.light_ids[positions]
         owners = np.repeat(np.arange(len(cells)), counts[cells])
         bounds = form_factor_bounds(half_balls.take(lights), areas[lights], radii[lights], edges, cells[owners])
-        order = np.lexsort((lights, -bounds, owners))
-        starts = np.cumsum(counts[cells]) - counts[cells]
-        ranks = np.arange(len(order)) - starts[owners]
-        surplus = order[ranks >= max_lights]
-        keep[positions[surplus]] = False
-        dropped += np.bincount(lights[surplus], minlength=len(half_balls)).astype(np.uint32)
+        late_owners, late_ranks = _surplus(owners, positions - starts[owners], bounds, counts[cells], max_lights)
+        surplus = starts[late_owners] + late_ranks
+        keep[surplus] = False
+        dropped += np.bincount(lists.light_ids[surplus], minlength=len(half_balls)).astype(np.uint32)
     if len(overflowing):
         lists = lists_from_counts(np.minimum(counts, max_lights), lists.light_ids[keep])
     total = int(counts.sum())
@@ -103,7 +113,26 @@ def form_factor_bounds(
     return np.where(outside, np.minimum(np.minimum(by_ball, by_area), 1.0), 1.0)
 
 
-def _blocks(cells: npt.NDArray[Any], counts: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
-    """`cells` in groups of some _ENTRIES_PER_BLOCK entries."""
-    groups = np.cumsum(counts[cells]) // _ENTRIES_PER_BLOCK
-    return np.split(cells, np.flatnonzero(np.diff(groups)) + 1) if len(cells) else []
+def _surplus(owners: Ints, ranks: Ints, bounds: Float64, counts: Ints, max_lights: int) -> tuple[Ints, Ints]:
+    """Owner and rank by id of the entries that do not fit.
+
+    One sort of one integer for each entry: owner, then falling bound (the bits of a positive float rise with it), then
+    rank.
+    """
+    falling = ~bounds.astype(np.float32).view(np.uint32)
+    keys = owners.astype(np.uint64) << np.uint64(_RANK_BITS + 32)
+    keys |= falling.astype(np.uint64) << np.uint64(_RANK_BITS)
+    keys |= ranks.astype(np.uint64)
+    keys.sort()
+    place = np.arange(len(keys)) - np.repeat(np.cumsum(counts) - counts, counts)
+    late = place >= max_lights
+    return owners[late], (keys[late] & np.uint64((1 << _RANK_BITS) - 1)).astype(np.int64)
+
+
+def _blocks(cells: Ints, counts: Ints) -> list[Ints]:
+    """`cells` in groups of some _ENTRIES_PER_BLOCK entries and at most _CELLS_PER_BLOCK cells."""
+    if not len(cells):
+        return []
+    by_entries = np.cumsum(counts[cells]) // _ENTRIES_PER_BLOCK
+    by_cells = np.arange(len(cells)) // _CELLS_PER_BLOCK
+    return np.split(cells, np.flatnonzero((np.diff(by_entries) > 0) | (np.diff(by_cells) > 0)) + 1)
