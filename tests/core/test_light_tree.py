@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The light tree: a partition of unity in the point's place, within its tolerance of the full sum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.form_factor_cases import room, unit
+from tests.render.rooms import lights_from_triangles
+from vlm_addon.core.form_factor import polygon_form_factor
+from vlm_addon.core.light_clusters import cluster_irradiance, light_clusters
+from vlm_addon.core.light_cut import cut_irradiance, light_cut
+from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
+from vlm_addon.core.light_tree import ROOT, LightTree, build_light_tree
+from vlm_addon.core.scene import Float64
+
+
+def column(x: float, y: float, radius: float, sides: int, rows: int) -> Float64:
+    """(2 sides rows, 3, 3) an upright column from z = 0 to 1 that shines outwards."""
+    angles = 2.0 * np.pi * np.arange(sides + 1) / sides
+    rim = np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles)], axis=-1)
+    quads = [
+        [[*rim[i], low], [*rim[i + 1], low], [*rim[i + 1], low + 1 / rows], [*rim[i], low + 1 / rows]]
+        for i in range(sides)
+        for low in np.arange(rows) / rows
+    ]
+    return np.array(quads)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+
+
+def hall(cuts: int) -> VirtualLightMesh:
+    """A closed cube of metre side with two columns, cut into lights of like size."""
+    columns = [column(x, 0.6, 0.08, 2 * cuts // 3, cuts) for x in (0.3, 0.7)]
+    return lights_from_triangles(np.concatenate([room(cuts), *columns]))
+
+
+def smooth_radiosity(lights: VirtualLightMesh) -> Float64:
+    wave = 1.0 + 0.5 * np.sin(lights.corners.mean(axis=1) @ [3.0, 2.0, 4.0])
+    return wave[:, None] * [0.5, 0.4, 0.3]
+
+
+def patch_radiosity(lights: VirtualLightMesh) -> Float64:
+    """One small patch of a column and the wall behind it is lit."""
+    distance = np.linalg.norm(lights.corners.mean(axis=1) - [0.3, 0.7, 0.5], axis=1)
+    return np.maximum(1.0 - distance / 0.2, 0.0)[:, None] * [1.0, 0.5, 0.2]
+
+
+def surface_points(lights: VirtualLightMesh, count: int) -> tuple[Float64, Float64]:
+    random = np.random.default_rng(3)
+    chosen = random.choice(len(lights), count, p=lights.areas / lights.areas.sum())
+    weights = random.dirichlet([1, 1, 1], count)
+    normals = unit(lights.area_vectors[chosen])
+    return np.einsum("nk,nkc->nc", weights, lights.corners[chosen]) + 1e-6 * normals, normals
+
+
+@pytest.fixture(scope="module")
+def lights() -> VirtualLightMesh:
+    return hall(12)
+
+
+@pytest.fixture(scope="module")
+def tree(lights: VirtualLightMesh) -> LightTree:
+    return build_light_tree(lights)
+
+
+def chain(tree: LightTree, light: int) -> list[int]:
+    cluster, found = int(tree.light_parent[light]), []
+    while cluster != ROOT:
+        found.append(cluster)
+        cluster = int(tree.parent[cluster])
+    return found
+
+
+def test_every_light_is_in_a_cluster_that_holds_it(lights: VirtualLightMesh, tree: LightTree) -> None:
+    for light in range(0, len(lights), 97):
+        line = chain(tree, light)
+        assert line
+        assert (np.diff(tree.level[line]) == 1).all()
+        for cluster in line:
+            reach = np.linalg.norm(lights.corners[light] - tree.centroid[cluster], axis=1).max()
+            assert reach <= tree.radius[cluster] * (1 + 1e-12)
+
+
+def test_sums_reach_the_roots(lights: VirtualLightMesh, tree: LightTree) -> None:
+    total = tree.sums(lights.areas)
+    assert total[tree.parent == ROOT].sum() == pytest.approx(lights.areas.sum(), rel=1e-12)
+
+
+def test_weights_along_every_line_to_the_root_add_up_to_one(lights: VirtualLightMesh, tree: LightTree) -> None:
+    clusters = light_clusters(tree, lights, smooth_radiosity(lights), 0.05)
+    points, _ = surface_points(lights, 20)
+    cut = light_cut(tree, clusters.window, points)
+    assert len(cut.clusters)
+    of_lights = np.zeros((len(points), len(lights)))
+    of_lights[cut.light_points, cut.lights] = cut.light_weights
+    of_clusters = np.zeros((len(points), len(tree)))
+    of_clusters[cut.cluster_points, cut.clusters] = cut.cluster_weights
+    assert of_clusters.min() >= 0.0
+    for light in range(len(lights)):
+        total = of_lights[:, light] + of_clusters[:, chain(tree, light)].sum(axis=1)
+        np.testing.assert_allclose(total, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("radiosity_of", [smooth_radiosity, patch_radiosity])
+@pytest.mark.parametrize("tolerance", [0.01, 0.02, 0.05, 0.1])
+def test_error_stays_within_the_tolerance(
+    lights: VirtualLightMesh, tree: LightTree, tolerance: float, radiosity_of: object
+) -> None:
+    radiosity = radiosity_of(lights)  # type: ignore[operator]
+    points, normals = surface_points(lights, 120)
+    full = polygon_form_factor(points, normals, lights.corners) @ radiosity
+    clusters = light_clusters(tree, lights, radiosity, tolerance)
+    tags = np.zeros(len(points), np.int32)
+    found, _ = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
+    reference = np.maximum(full.sum(axis=1), 0.1 * full.sum(axis=1).mean())
+    error = np.abs(found - full).sum(axis=1) / reference
+    assert np.quantile(error, 0.95) <= tolerance
+    assert np.quantile(error, 0.999) <= 3.0 * tolerance
+
+
+def test_a_coarser_tolerance_evaluates_less(lights: VirtualLightMesh, tree: LightTree) -> None:
+    radiosity = smooth_radiosity(lights)
+    points, normals = surface_points(lights, 40)
+    tags = np.zeros(len(points), np.int32)
+    evaluated = []
+    for tolerance in (0.01, 0.1, 1.0):
+        clusters = light_clusters(tree, lights, radiosity, tolerance)
+        _, counts = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
+        evaluated.append(counts.mean())
+    assert len(lights) > evaluated[0] > evaluated[1] > evaluated[2]
+    assert evaluated[2] < 0.5 * len(lights)
+
+
+def test_a_line_over_the_wall_has_no_step(lights: VirtualLightMesh, tree: LightTree) -> None:
+    """Steps between neighbours shrink with their distance everywhere, so there is no jump anywhere."""
+    radiosity = smooth_radiosity(lights)
+    clusters = light_clusters(tree, lights, radiosity, 0.1)
+
+    def largest_step(count: int) -> float:
+        points = np.column_stack([np.linspace(0.2, 0.5, count), np.full(count, 0.31), np.full(count, 1e-4)])
+        normals = np.tile((0.0, 0.0, 1.0), (count, 1))
+        tags = np.zeros(count, np.int32)
+        values, _ = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
+        return float(np.abs(np.diff(values.sum(axis=1))).max())
+
+    assert largest_step(801) < 0.6 * largest_step(401)
+
+
+def test_lights_of_the_own_tag_give_exactly_nothing(lights: VirtualLightMesh) -> None:
+    tagged = lights_from_triangles(lights.corners, tag_ids=np.where(np.arange(len(lights)) < len(lights) // 2, 7, 0))
+    tree = build_light_tree(tagged)
+    radiosity = np.where(tagged.tag_ids[:, None] == 7, 1.0, 0.0) * np.ones(3)
+    clusters = light_clusters(tree, tagged, radiosity, 0.1)
+    points, normals = surface_points(tagged, 50)
+    own, _ = cut_irradiance(tree, clusters, tagged, radiosity, points, normals, np.full(50, 7, np.int32))
+    others, _ = cut_irradiance(tree, clusters, tagged, radiosity, points, normals, np.full(50, 5, np.int32))
+    assert not own.any()
+    assert others.any()
+
+
+def test_a_flat_cluster_far_away_is_its_lights(tree: LightTree, lights: VirtualLightMesh) -> None:
+    """A wall's clusters have one normal, so they differ from their lights by second order in their size only."""
+    wall = lights_from_triangles(lights.corners[:100])
+    own = build_light_tree(wall)
+    radiosity = np.ones((len(wall), 3))
+    clusters = light_clusters(own, wall, radiosity, 0.02)
+    direction = unit(np.array([0.3, 0.4, 0.8]))
+    points = 30.0 * direction[None]
+    full = float(polygon_form_factor(points, -direction[None], wall.corners).sum()) * 3.0
+    roots = np.flatnonzero(own.parent == ROOT)
+    towards = np.repeat(points, len(roots), axis=0), np.repeat(-direction[None], len(roots), axis=0)
+    assert cluster_irradiance(clusters, roots, *towards).sum() == pytest.approx(full, rel=2e-3)
+
+
+def test_no_lights_and_no_power_give_nothing() -> None:
+    tree = build_light_tree(empty_light_mesh())
+    assert len(tree) == 0
+    dark = hall(4)
+    dark_tree = build_light_tree(dark)
+    clusters = light_clusters(dark_tree, dark, np.zeros((len(dark), 3)), 0.02)
+    points, normals = surface_points(dark, 10)
+    tags = np.zeros(10, np.int32)
+    values, counts = cut_irradiance(dark_tree, clusters, dark, np.zeros((len(dark), 3)), points, normals, tags)
+    assert not values.any()
+    assert not counts.any()
+
+
+@pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
+def test_scale_changes_nothing(scale: float) -> None:
+    small = hall(6)
+    large = lights_from_triangles(scale * small.corners)
+    points, normals = surface_points(small, 30)
+    tags = np.zeros(30, np.int32)
+    results = []
+    for lights_of, at in ((small, points), (large, scale * points)):
+        tree = build_light_tree(lights_of)
+        radiosity = smooth_radiosity(small)
+        clusters = light_clusters(tree, lights_of, radiosity, 0.05)
+        results.append(cut_irradiance(tree, clusters, lights_of, radiosity, at, normals, tags)[0])
+    np.testing.assert_allclose(results[1], results[0], rtol=1e-6)
