@@ -124,7 +124,7 @@ def _clip(corners: list[Vector[Number]], heights: list[Number]) -> _Outline[Numb
     for (a, b), (height_a, height_b), (a_above, b_above) in zip(
         _pairs(corners), _pairs(heights), _pairs(above), strict=True
     ):
-        at_horizon = _at_horizon(a, b, height_a, height_b)
+        at_horizon = _at_horizon(a, b, height_a, height_b, a_above != b_above)
         edges.append(_Edge(_choose(a_above, a, at_horizon), _choose(b_above, b, at_horizon), a_above | b_above))
         exit_point = _choose(a_above & ~b_above, at_horizon, exit_point)
         entry_point = _choose(~a_above & b_above, at_horizon, entry_point)
@@ -132,11 +132,13 @@ def _clip(corners: list[Vector[Number]], heights: list[Number]) -> _Outline[Numb
     return _Outline(edges, exit_point, entry_point, is_cut)
 
 
-def _at_horizon(a: Vector[Number], b: Vector[Number], height_a: Number, height_b: Number) -> Vector[Number]:
-    """Where an edge with one end above the horizon meets it; anything for other edges."""
+def _at_horizon(
+    a: Vector[Number], b: Vector[Number], height_a: Number, height_b: Number, crosses: Array
+) -> Vector[Number]:
+    """Where an edge that crosses the horizon meets it; anything for other edges."""
     # From the end that is closer to the horizon, which may be a corner that almost touches the point.
     a_closer = np.abs(_plain(height_a)) < np.abs(_plain(height_b))
-    share = _ratio(_select(a_closer, height_a, height_b), height_a - height_b)
+    share = _ratio(_select(a_closer, height_a, height_b), height_a - height_b, crosses)
     base = _choose(a_closer, a, b)
     return base[0] + (b[0] - a[0]) * share, base[1] + (b[1] - a[1]) * share, base[2] + (b[2] - a[2]) * share
 
@@ -182,13 +184,13 @@ def _select(condition: Array, yes: Number, no: Number) -> Number:
     return np.where(condition, yes, no)
 
 
-def _ratio(a: Number, b: Number) -> Number:
-    """a / b, 0 where b is 0."""
-    divisor = _plain(b)
-    safe = np.where(divisor == 0.0, 1.0, divisor).astype(divisor.dtype)
+def _ratio(a: Number, b: Number, where: Array) -> Number:
+    """a / b, 0 elsewhere."""
+    zero = np.zeros_like(_plain(a))
+    safe = np.where(where, _plain(b), 1.0).astype(zero.dtype)
     if isinstance(a, DoubleDouble):
-        return quotient(a, DoubleDouble(safe, b.low))
-    return a / safe
+        return quotient(_select(where, a, double_double(zero)), DoubleDouble(safe, np.where(where, b.low, zero)))
+    return np.where(where, a, zero) / safe
 
 
 def _pairs(items: list[Item]) -> list[tuple[Item, Item]]:
