@@ -123,7 +123,7 @@ float unit_scale(float radius) {
 // Most that a polygon can give: between its plane and the horizon a lune of the hemisphere is left. Where the polygon
 // faces as the surface does that is little; in its plane, where rounded edges may wind around the point, nothing.
 float most_form_factor(vec3 n, vec3 area) {
-    return max(0.5 - 0.5 * dot(n, area) * inversesqrt(max(dot(area, area), 1e-37)), 0.0);
+    return clamp(0.5 - 0.5 * dot(n, area) * inversesqrt(max(dot(area, area), 1e-37)), 0.0, 1.0);
 }
 
 // Share of the hemisphere over p with normal n that a triangle fills, cosine-weighted, clipped at the horizon; in

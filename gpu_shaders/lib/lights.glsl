@@ -77,10 +77,10 @@ void add_clipped_edge(vec3 a, vec3 b, vec3 n, inout float sum, inout vec3 exit_p
         return;
     }
     if (height_a <= 0.0) {
-        a += (b - a) * (height_a / (height_a - height_b));
+        a = edge_at_horizon(a, b, height_a, height_b);
         entry_point = a;
     } else if (height_b <= 0.0) {
-        b = a + (b - a) * (height_a / (height_a - height_b));
+        b = edge_at_horizon(a, b, height_a, height_b);
         exit_point = b;
     }
     sum += edge_irradiance(b, a, n);
@@ -116,7 +116,7 @@ float cell_form_factor(Lamp lamp, vec3 p, vec3 n) {
     if (dot(exit_point, exit_point) > 0.0) {
         sum += horizon_arc(exit_point, entry_point, n);
     }
-    return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, 1.0);
+    return clamp(sum * (0.5 / FORM_FACTOR_PI), 0.0, most_form_factor(n, -lamp.z_axis));
 }
 
 // Direction to the sample point of a lamp and what it brings to a surface that faces it.

@@ -308,13 +308,38 @@ def test_vector_form_factor_in_contact_points_at_the_polygon() -> None:
         ([[0, 0, 0.0]], [[0, 0, 1.0]], np.zeros((1, 9, 3))),
         ([[0, 0, 0.0], [1, 0, 0]], [[0, 0, 1.0]], SQUARE[None]),
         ([[0, 0, "high"]], [[0, 0, 1.0]], SQUARE[None]),
+        ([[0, 0, 10**400]], [[0, 0, 1.0]], SQUARE[None]),
+        ([[0, 0, 1j]], [[0, 0, 1.0]], SQUARE[None]),
         ([[0, 0, 0.0]], [[0, 0, 1.0]], [[[0, 0, 0], [1, 0]]]),
     ],
-    ids=["nan", "infinity", "no normal", "two vertices", "nine vertices", "lengths differ", "a word", "ragged"],
+    ids=[
+        "nan",
+        "infinity",
+        "no normal",
+        "two vertices",
+        "nine vertices",
+        "lengths differ",
+        "a word",
+        "too large",
+        "complex",
+        "ragged",
+    ],
 )
 def test_bad_input_is_refused(points: object, normals: object, polygons: object) -> None:
     with pytest.raises(InvalidInput):
         polygon_form_factor(points, normals, polygons)
+
+
+@pytest.mark.parametrize("length", [1e-320, 1e-200, 0.5, 1e200])
+def test_length_of_the_normal_does_not_matter(length: float) -> None:
+    normal = np.array([0.0, 0.0, -1.0])
+    value = one([0.1, 0.2, 0.8], length * normal, SQUARE)
+    assert value == pytest.approx(one([0.1, 0.2, 0.8], normal, SQUARE), rel=1e-14)
+
+
+def test_ragged_points_of_the_vector_form_are_refused() -> None:
+    with pytest.raises(InvalidInput):
+        paired_vector_form_factor([[0, 0, 0], [1, 0]], SQUARE[None])  # type: ignore[list-item]
 
 
 def test_pairs_of_unequal_count_are_refused() -> None:

@@ -40,7 +40,7 @@ def test_flat_wall_moves_by_the_inset_only() -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.1])
 def test_inset_survives_float32(angle: float) -> None:
-    # The heights of step 1 of docs/numerics.md, in float32 relative to the middle of the lights, must all be negative.
+    # Heights over the horizon as shaders compute them, in float32 from the middle of the lights, must all be negative.
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     positions, triangles = grid(6, 6, 30.0, 30.0)
     positions = (positions - [15, 15, 0]) @ turn.T

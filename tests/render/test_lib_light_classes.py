@@ -96,6 +96,14 @@ def test_far_form_factor(device: Device) -> None:
     np.testing.assert_allclose(values, general, rtol=1e-3, atol=2e-7)
 
 
+def test_far_form_factor_a_million_radii_away(device: Device) -> None:
+    inputs, exact = single_points(100.0, 1e6)
+    values = evaluate(device, PATH, "far_form_factor(p, n, a, b, c, v)", inputs)
+    squared = ((inputs["a"] - inputs["p"]) ** 2).sum(axis=1)
+    squarely_seen = np.linalg.norm(inputs["v"], axis=1) / (np.pi * squared)
+    assert (np.abs(values - exact) <= 1e-4 * exact + 2.0**-21 * squarely_seen).all()
+
+
 def test_whole_form_factor(device: Device) -> None:
     inputs, exact = single_points(0.5, FAR_RADII)
     values = evaluate(device, PATH, "whole_form_factor(p, n, a, b, c, v, r)", inputs)

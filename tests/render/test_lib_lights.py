@@ -357,6 +357,23 @@ def test_cell_form_factor(device: Device, name: str) -> None:
         np.testing.assert_allclose(found[near], expected[near], atol=2e-2)
 
 
+@pytest.mark.parametrize("extent", [0.0, 15.0, 1000.0])
+def test_surface_that_an_area_lamp_lies_in_stays_dark(device: Device, extent: float) -> None:
+    """A lamp flush with a ceiling in any direction: no rounding lifts it over the ceiling's horizon."""
+    random = np.random.default_rng(int(extent))
+    for _ in range(4):
+        axes = np.linalg.qr(random.normal(size=(3, 3)))[0].astype(np.float32).astype(float)
+        axes[2] *= np.sign(np.linalg.det(axes))
+        place = tuple(random.uniform(-extent, extent, 3).astype(np.float32).tolist())
+        x, y, z = (tuple(axis.tolist()) for axis in axes)
+        light = replace(LAMPS["rectangle"], position=place, x_axis=x, y_axis=y, z_axis=z)
+        points = np.array(place) + random.uniform(-1.5, 1.5, (COUNT, 2)) @ axes[:2]
+        inputs = {"p": points, "n": np.tile(-axes[2], (COUNT, 1))}
+        for sample in lamps.lamp_samples(light, 2):
+            call = f"cell_form_factor({lamp_literal(light, sample)}, p, n)"
+            assert evaluate(device, "lib/lights.glsl", call, inputs).max() < 1e-6
+
+
 def test_clipped_edge(device: Device) -> None:
     """Part of one edge over the horizon, in units of 2 pi times the form factor, and where it enters and leaves."""
     random = np.random.default_rng(7)

@@ -64,7 +64,8 @@ def paired_vector_form_factor(points: npt.ArrayLike, polygons: npt.ArrayLike) ->
     length bounds the form factor for such normals. It points towards the polygon and is 0 behind it and in its plane.
     Raises as `polygon_form_factor`.
     """
-    points, _, polygons = _validated(points, np.ones(np.shape(points)), polygons, np.float64)
+    points = _numbers("points", points, np.float64)
+    points, _, polygons = _validated(points, np.ones_like(points), polygons, np.float64)
     _require_pairs(points, polygons)
     points, polygons = _scaled(points, polygons)
     faces = _faces_point(points, polygons)
@@ -103,8 +104,11 @@ def _validated(
     if points.ndim != 2 or points.shape[-1] != 3 or points.shape != normals.shape:
         problem = f"shapes {points.shape} and {normals.shape}"
         raise InvalidInput("form factor points and normals", problem, "give (p, 3) for both")
-    if not normals.any(-1).all():
+    longest = np.abs(normals).max(axis=-1, initial=0.0, keepdims=True)
+    if (longest == 0.0).any():
         raise InvalidInput("form factor normals", "one has no length", "give unit normals")
+    # Powers of two, so that nothing is rounded and squares stay in range.
+    normals = np.ldexp(normals, -np.frexp(longest)[1])
     if polygons.ndim != 3 or polygons.shape[2] != 3 or not MIN_VERTICES <= polygons.shape[1] <= MAX_VERTICES:
         remedy = f"give (q, k, 3) with k from {MIN_VERTICES} to {MAX_VERTICES}"
         raise InvalidInput("form factor polygons", f"shape {polygons.shape}", remedy)
@@ -114,7 +118,9 @@ def _validated(
 def _numbers(name: str, values: npt.ArrayLike, dtype: npt.DTypeLike) -> Array:
     try:
         array = np.asarray(values, dtype)
-    except (TypeError, ValueError) as error:
+        if np.iscomplexobj(values):
+            raise TypeError("complex numbers")
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(f"form factor {name}", str(error), "give one regular array of numbers") from error
     if not np.isfinite(array).all():
         raise InvalidInput(f"form factor {name}", "not all values are finite", "remove NaN and infinity")
