@@ -47,7 +47,7 @@ CAMERAS = [
 ]
 # One sample a pixel, at its centre, so that a pixel's face is all that it shows.
 SMALL = RenderSettings(128, 96, "vlm", samples=1, shadow_resolution=512, shadow_samples=1, buffers=True)
-LARGE = replace(SMALL, width=256, height=192, shadow_resolution=1024, shadow_samples=8)
+LARGE = replace(SMALL, width=320, height=240, shadow_resolution=1024, shadow_samples=8)
 LARGE_ONLY = pytest.mark.full
 SIZES = [pytest.param(SMALL, id="small"), pytest.param(LARGE, id="large", marks=LARGE_ONLY)]
 # A virtual light's own measure of the lamps is as coarse as the points that it takes of them.
