@@ -95,10 +95,22 @@ def test_weights_along_every_line_to_the_root_add_up_to_one(lights: VirtualLight
     of_lights[cut.light_points, cut.lights] = cut.light_weights
     of_clusters = np.zeros((len(points), len(tree)))
     of_clusters[cut.cluster_points, cut.clusters] = cut.cluster_weights
-    assert of_clusters.min() >= 0.0
+    assert of_clusters.min() >= -1e-15
     for light in range(len(lights)):
         total = of_lights[:, light] + of_clusters[:, chain(tree, light)].sum(axis=1)
         np.testing.assert_allclose(total, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("radiosity_of", [smooth_radiosity, patch_radiosity])
+@pytest.mark.parametrize("tolerance", [0.01, 0.3])
+def test_windows_are_nested(lights: VirtualLightMesh, tree: LightTree, tolerance: float, radiosity_of: object) -> None:
+    """So that a parent's weight is nowhere less than a cluster's, whatever the point."""
+    window = light_clusters(tree, lights, radiosity_of(lights), tolerance).window  # type: ignore[operator]
+    inner = np.flatnonzero(tree.parent != ROOT)
+    outer = tree.parent[inner]
+    apart = np.linalg.norm(tree.centroid[inner] - tree.centroid[outer], axis=1)
+    assert (window > 0.0).all()
+    assert (window[outer] >= window[inner] + apart).all()
 
 
 @pytest.mark.parametrize("radiosity_of", [smooth_radiosity, patch_radiosity])

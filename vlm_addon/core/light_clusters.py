@@ -110,7 +110,8 @@ def _longest_axes(spread: Float64) -> Float64:
 def _windows(tree: LightTree, power: Float64, flux: Float64, allowed: float) -> Float64:
     """(c,) m: where power / (pi d²) x the cluster's share of error falls to _ALLOWANCE x `allowed` (W/m²).
 
-    Never less than what keeps windows nested: where a cluster's window has any weight, its parent's has, too.
+    Nested: a parent's window reaches a cluster's window and the distance between their centroids, so that the parent's
+    weight is nowhere less than the cluster's.
     """
     error = np.maximum(_ALLOWANCE * allowed, np.finfo(float).tiny) * np.pi / power
     lean = _SPREAD_ERROR * (1.0 - np.linalg.norm(flux, axis=1) / power)
@@ -121,5 +122,5 @@ def _windows(tree: LightTree, power: Float64, flux: Float64, allowed: float) -> 
         inner = clusters[tree.parent[clusters] != ROOT]
         outer = tree.parent[inner]
         apart = np.linalg.norm(tree.centroid[inner] - tree.centroid[outer], axis=1)
-        np.maximum.at(window, outer, window[inner] + 0.5 * apart)
+        np.maximum.at(window, outer, window[inner] + apart)
     return window

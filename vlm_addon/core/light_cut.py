@@ -51,8 +51,7 @@ def light_cut(tree: LightTree, window: Float64, points: Float64) -> LightCut:
     members: list[tuple[Indices, Indices, Float64]] = []
     while len(cluster):
         distance = np.linalg.norm(points[point] - tree.centroid[cluster], axis=1)
-        # Never more than its parent's, so that no weight is negative.
-        own = np.minimum(_window(distance, window[cluster]), outer)
+        own = _window(distance, window[cluster])
         counts = outer > own
         found.append((point[counts], cluster[counts], (outer - own)[counts]))
         opened = own > 0.0
