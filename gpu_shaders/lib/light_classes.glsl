@@ -4,21 +4,12 @@
 #ifndef LIB_LIGHT_CLASSES
 #define LIB_LIGHT_CLASSES
 #include "lib/form_factor.glsl"
+#include "gpu_layout/PointGroup"
 
 #define LIGHT_GIVES_NOTHING 0
 #define LIGHT_IS_FAR 1
 #define LIGHT_IS_WHOLE 2
 #define LIGHT_IS_CLIPPED 3
-
-// Bounds of a group of surface points. Lengths in metres.
-struct PointGroup {
-    vec3 centre;            // of the box around the points
-    vec3 half_extent;       // of that box
-    vec3 axis;              // unit, amid the normals
-    float lowest;           // least and greatest dot(axis, point)
-    float highest;
-    float cos_spread;       // of the largest angle between a normal and the axis
-};
 
 // The class that holds for every point of the group. v0, v1, v2, area_vector, bounding_radius: of the light, as in
 // triangle_form_factor.

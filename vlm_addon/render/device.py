@@ -17,6 +17,7 @@ from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress, silent
 from ..core.scene import SceneSnapshot
 from .frame_types import Frame, RenderSettings
+from .light_structures import LightStructures
 from .shader_library import ShaderLibrary
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Device:
         self.name: str = self.context.info["GL_RENDERER"]
         self.is_software = any(word in self.name.lower() for word in SOFTWARE_RENDERERS)
         self.shaders = ShaderLibrary(self.context)
+        self.light_structures = LightStructures()
         # moderngl never deletes a query, so frames share them.
         self._queries: list[Any] = []
 
@@ -57,7 +59,7 @@ class Device:
         if self._closed:
             return
         with self.current():
-            del self.shaders
+            del self.shaders, self.light_structures
         self._closed = True
         self.context.release()
 

@@ -54,7 +54,18 @@ def render_frame(
         geometry = GpuGeometry(context, local, np.zeros(3))
     shadows = LampShadows(context, shaders, geometry, local.lights, settings.shadow_resolution)
     scene = SceneInputs(
-        context, shaders, timer, local, geometry, shadows, local_lights, settings, _within(progress, 0.0, PREPARED)
+        context,
+        shaders,
+        timer,
+        local,
+        geometry,
+        shadows,
+        local_lights,
+        light_mesh,
+        space,
+        device.light_structures,
+        settings,
+        _within(progress, 0.0, PREPARED),
     )
     technique = technique_type(scene, chosen)
     direct_light = DirectLightPass(context, shaders, width, height)

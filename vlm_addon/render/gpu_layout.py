@@ -179,8 +179,74 @@ HALF_BALL = GpuStruct(
 )
 """One of core.active_hemisphere.HalfBalls, in the grid's frame."""
 
+POINT_GROUP = GpuStruct(
+    "PointGroup",
+    (
+        ("vec3", "centre"),
+        ("vec3", "half_extent"),
+        ("vec3", "axis"),
+        ("float", "lowest"),
+        ("float", "highest"),
+        ("float", "cos_spread"),
+    ),
+)
+"""Bounds of a group of surface points, in metres from the local origin. centre, half_extent: of the box around them.
+axis: unit, amid the normals; lowest, highest: least and greatest dot(axis, point). cos_spread: of the largest angle
+between a normal and the axis."""
+
+LIGHT_NODE = GpuStruct(
+    "LightNode",
+    (
+        ("vec3", "centre"),
+        ("float", "window"),
+        ("vec3", "axis"),
+        ("float", "plane"),
+        ("vec3", "middle"),
+        ("float", "cone_cos"),
+        ("vec3", "half_extent"),
+        ("float", "cone_sin"),
+        ("uint", "first_child"),
+        ("uint", "end_child"),
+        ("uint", "first_light"),
+        ("uint", "end_light"),
+    ),
+)
+"""A cluster of core.light_tree.LightTree in metres from the local origin. centre: its centroid. middle, half_extent: of
+its box. Its clusters are nodes first_child to end_child, its lights those at first_light to end_light in the forest's order."""
+
+LIGHT_CLUSTER = GpuStruct(
+    "LightCluster",
+    (
+        ("vec3", "mean"),
+        ("int", "tag_id"),
+        ("vec3", "first_axis"),
+        ("float", "parent_window"),
+        ("vec3", "second_axis"),
+        ("float", "least_squared"),
+        ("vec3", "normal"),
+        ("vec3", "variances"),
+        ("vec3", "covariances"),
+        ("vec3", "power"),
+        ("vec3", "parent_centre"),
+    ),
+)
+"""What a cluster sends out: core.light_clusters.LightClusters. first_axis, second_axis: from the mean to two of its
+four points. normal: flux over power. variances (xx, yy, zz), covariances (xy, yz, xz): of the normals. power: rgb, W."""
+
 STRUCTS: dict[str, GpuStruct] = {
-    struct.name: struct for struct in (VIRTUAL_LIGHT, TRIANGLE, MATERIAL, LAMP, SOURCE_SAMPLE, SOURCE_LIGHT, HALF_BALL)
+    struct.name: struct
+    for struct in (
+        VIRTUAL_LIGHT,
+        TRIANGLE,
+        MATERIAL,
+        LAMP,
+        SOURCE_SAMPLE,
+        SOURCE_LIGHT,
+        HALF_BALL,
+        POINT_GROUP,
+        LIGHT_NODE,
+        LIGHT_CLUSTER,
+    )
 }
 """What `#include "gpu_layout/Name"` finds."""
 

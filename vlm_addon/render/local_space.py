@@ -33,25 +33,26 @@ class LocalSpace:
 
     def scene(self, snapshot: SceneSnapshot) -> SceneSnapshot:
         """`snapshot` with everything that has a place or a length in local units."""
-        meshes = tuple(replace(mesh, positions=self._points(mesh.positions)) for mesh in snapshot.meshes)
+        meshes = tuple(replace(mesh, positions=self.local_points(mesh.positions)) for mesh in snapshot.meshes)
         lights = tuple(self._light(light) for light in snapshot.lights)
         camera = self._camera(snapshot.camera) if snapshot.camera is not None else None
         return replace(snapshot, meshes=meshes, lights=lights, camera=camera)
 
     def light_mesh(self, light_mesh: VirtualLightMesh) -> VirtualLightMesh:
         """`light_mesh` in local units."""
-        samples = replace(light_mesh.samples, positions=self._points(light_mesh.samples.positions))
-        return replace(light_mesh, vertices=self._points(light_mesh.vertices), samples=samples)
+        samples = replace(light_mesh.samples, positions=self.local_points(light_mesh.samples.positions))
+        return replace(light_mesh, vertices=self.local_points(light_mesh.vertices), samples=samples)
 
     def world_points(self, points: Float32) -> Float64:
         """(..., 3) float64 m in world space of local `points`."""
         return points * self.unit + self.origin
 
-    def _points(self, points: Float64) -> Float64:
+    def local_points(self, points: Float64) -> Float64:
+        """(..., 3) local points of `points` in world space."""
         return (points - self.origin) / self.unit
 
     def _light(self, light: Light) -> Light:
-        x, y, z = self._points(np.array(light.position, np.float64)).tolist()
+        x, y, z = self.local_points(np.array(light.position, np.float64)).tolist()
         red, green, blue = light.power
         # Irradiance falls with the square of a distance; a sun's is given.
         share = 1.0 if light.kind == SUN else self.unit**-2
@@ -66,7 +67,7 @@ class LocalSpace:
 
     def _camera(self, camera: Camera) -> Camera:
         matrix = camera.matrix_world.copy()
-        matrix[:3, 3] = self._points(matrix[:3, 3])
+        matrix[:3, 3] = self.local_points(matrix[:3, 3])
         return replace(
             camera,
             matrix_world=matrix,

@@ -18,6 +18,8 @@ from ..core.scene import SceneSnapshot
 from . import techniques
 from .frame_types import RenderSettings
 from .geometry import GpuGeometry
+from .light_structures import LightStructures
+from .local_space import LocalSpace
 from .passes.gbuffer import GBuffer
 from .passes.shadow_map import LampShadows
 from .shader_library import ShaderLibrary
@@ -33,7 +35,8 @@ if TYPE_CHECKING:
 class SceneInputs:
     """What stays the same over the samples of a frame.
 
-    light_mesh: None where the caller gave none. progress: of the work before the first sample.
+    light_mesh: None where the caller gave none; world_lights: the same in world space. space: where the others are.
+    structures: what the device keeps over frames. progress: of the work before the first sample.
     """
 
     context: moderngl.Context
@@ -43,6 +46,9 @@ class SceneInputs:
     geometry: GpuGeometry
     shadows: LampShadows
     light_mesh: VirtualLightMesh | None
+    world_lights: VirtualLightMesh | None
+    space: LocalSpace
+    structures: LightStructures
     settings: RenderSettings
     progress: Progress
 

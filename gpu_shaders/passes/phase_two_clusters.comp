@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Irradiance of every pixel from the clusters in the list of its tile, each with its weight there, added to what
+// earlier lists gave.
+#define TILE_ACCESS readonly
+#include "passes/tile_pixels.glsl"
+#include "passes/tile_lists.glsl"
+#include "lib/light_cluster.glsl"
+
+#define WORDS (GROUP_SIZE / 32)
+
+layout(std430, binding = LIGHT_NODE_BINDING) readonly buffer LightNodes { LightNode nodes[]; };
+layout(std430, binding = LIGHT_CLUSTER_BINDING) readonly buffer LightClusters { LightCluster clusters[]; };
+
+layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²
+
+// One bit for each cluster of a batch that may light the tile.
+shared uint members[WORDS];
+
+vec3 sums[PIXELS];
+vec3 batch_sums[PIXELS];
+
+void classify(PointGroup group, uint first, uint end) {
+    uint index = gl_LocalInvocationIndex;
+    if (index < uint(WORDS)) {
+        members[index] = 0u;
+    }
+    barrier();
+    uint at = first + index;
+    if (at < end) {
+        LightNode node = nodes[entries[at]];
+        bool is_lit = any(greaterThan(clusters[entries[at]].power, vec3(0.0)));
+        bool counts = distance_range(group, node.centre).y > node.window;
+        if (is_lit && counts && !cluster_gives_nothing(group, node)) {
+            atomicOr(members[index / 32u], 1u << (index % 32u));
+        }
+    }
+    barrier();
+}
+
+void main() {
+    uint tile = this_tile();
+    uvec2 run = this_run();
+    if (run.x >= run.y) {
+        return;
+    }
+    PointGroup group = tiles[tile];
+    fetch_pixels(tile);
+    for (int k = 0; k < PIXELS; ++k) {
+        sums[k] = vec3(0.0);
+    }
+    for (uint first = run.x; first < run.y; first += GROUP_SIZE) {
+        classify(group, first, run.y);
+        for (int k = 0; k < PIXELS; ++k) {
+            batch_sums[k] = vec3(0.0);
+        }
+        for (int word = 0; word < WORDS; ++word) {
+            uint bits = members[word];
+            while (bits != 0u) {
+                uint i = entries[first + uint(32 * word + findLSB(bits))];
+                bits &= bits - 1u;
+                LightNode node = nodes[i];
+                LightCluster cluster = clusters[i];
+                for (int k = 0; k < PIXELS; ++k) {
+                    float factor = cluster_weight(node, cluster, positions[k])
+                        * cluster_factor(node, cluster, positions[k], normals[k]);
+                    bool is_own = cluster.tag_id != UNTAGGED && cluster.tag_id == tag_ids[k];
+                    batch_sums[k] += is_own ? vec3(0.0) : factor * cluster.power;
+                }
+            }
+        }
+        for (int k = 0; k < PIXELS; ++k) {
+            sums[k] += batch_sums[k];
+        }
+        barrier();
+    }
+    for (int k = 0; k < PIXELS; ++k) {
+        if (shown[k]) {
+            ivec2 pixel = pixel_at(tile, k);
+            imageStore(irradiance, pixel, vec4(imageLoad(irradiance, pixel).rgb + sums[k], 1.0));
+        }
+    }
+}
