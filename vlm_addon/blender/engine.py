@@ -14,6 +14,7 @@ from ..render.technique import technique_by_name
 from .availability import rendering_problem
 from .color_space import convert, rec709_to_working
 from .light_mesh_io import extract
+from .properties import technique_settings
 from .render_process import KEPT
 
 ENGINE_ID = "VLM_ENGINE"
@@ -72,7 +73,13 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
         if scene.render.film_transparent:
             self.report({"WARNING"}, "Film > Transparent is not supported: the world is shown and alpha is 1")
         width, height = _picture_size(scene)
-        settings = RenderSettings(width=width, height=height, technique=technique, samples=scene.vlm.samples)
+        settings = RenderSettings(
+            width=width,
+            height=height,
+            technique=technique,
+            technique_settings=technique_settings(scene, technique),
+            samples=scene.vlm.samples,
+        )
         frame = KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
         if self._is_cancelled():  # too late for the renderer to notice
             raise Cancelled("render")

@@ -8,8 +8,10 @@ from typing import Any
 
 import bpy
 
+from ..render.technique import technique_by_name
 from . import authoring, availability
 from .engine import ENGINE_ID
+from .properties import shown_settings, technique_group
 
 CATEGORY = "VLM"
 PIXELS_PER_CHARACTER = 7
@@ -81,9 +83,20 @@ class VLM_PT_render(_SidebarPanel, bpy.types.Panel):  # noqa: N801
         column = layout.column()
         column.active = scene.render.engine == ENGINE_ID
         _labelled(column, scene.vlm, "technique")
+        _technique_settings(column, scene)
         column.prop(scene.vlm, "samples")
         layout.operator("render.render", text="Render Image", icon="RENDER_STILL")
         _hint(layout, context, availability.rendering_problem())
+
+
+def _technique_settings(layout: Any, scene: Any) -> None:
+    technique = technique_by_name(scene.vlm.technique)
+    group = technique_group(scene, technique.name)
+    for name in shown_settings(group, technique.settings):
+        if isinstance(getattr(group, name), str):
+            _labelled(layout, group, name)
+        else:
+            layout.prop(group, name)
 
 
 def _labelled(layout: Any, owner: Any, name: str) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import ExitStack
 from typing import Any, TypeVar
 
 import bpy
@@ -11,12 +12,14 @@ import bpy
 from ..core.settings import SettingInfo, describe, from_mapping
 from ..core.simplify import SimplifySettings
 from ..render.frame_types import RenderSettings
-from ..render.technique import technique_list
+from ..render.technique import Technique, technique_by_name, technique_list
 
 S = TypeVar("S")
 
 SCENE_PROPERTY = "vlm"
 MOST_SAMPLES = 4096
+FLOAT32_DIGITS = 6
+"""Significant digits of a Blender property: a limit read back from it is still within the limits."""
 
 
 def property_annotations(settings_type: type) -> dict[str, Any]:
@@ -26,8 +29,34 @@ def property_annotations(settings_type: type) -> dict[str, Any]:
 
 def settings_from(owner: Any, settings_type: type[S]) -> S:
     """The Settings dataclass with the values of the properties of `owner`. Raises InvalidInput."""
-    names = [info.name for info in describe(settings_type)]
-    return from_mapping(settings_type, {name: getattr(owner, name) for name in names}, settings_type.__name__)
+    values = {info.name: _value(owner, info) for info in describe(settings_type)}
+    return from_mapping(settings_type, values, settings_type.__name__)
+
+
+def technique_settings(scene: Any, technique: str) -> dict[str, Any]:
+    """Values by name of the settings that `scene` keeps for a technique. Raises InvalidInput where there is none."""
+    settings_type = technique_by_name(technique).settings
+    group = technique_group(scene, technique)
+    return {info.name: _value(group, info) for info in describe(settings_type)} if group is not None else {}
+
+
+def technique_group(scene: Any, technique: str) -> Any:
+    """The properties that `scene` keeps for a technique; None for a technique without settings."""
+    return getattr(getattr(scene, SCENE_PROPERTY), _group_name(technique), None)
+
+
+def shown_settings(group: Any, settings_type: type) -> list[str]:
+    """Names of the settings in `group` that count with the others as they are."""
+    return [
+        info.name
+        for info in describe(settings_type)
+        if info.only_with is None or getattr(group, info.only_with[0]) == info.only_with[1]
+    ]
+
+
+def _value(owner: Any, info: SettingInfo) -> Any:
+    value = getattr(owner, info.name)
+    return float(f"{value:.{FLOAT32_DIGITS}g}") if info.type is float else value
 
 
 def _property(info: SettingInfo) -> Any:
@@ -55,8 +84,35 @@ class VLM_PG_finding(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming o
     text: bpy.props.StringProperty(name="Finding")  # type: ignore[valid-type]
 
 
-def scene_property_classes() -> tuple[type, ...]:
-    """The property groups in order of registration; `register` puts the last one at `scene.vlm`."""
+def register_scene_settings(undo: ExitStack) -> None:
+    """Give scenes the property `vlm`; `undo` hears how to take it away again."""
+    groups = {technique.name: _settings_group(technique) for technique in technique_list()}
+    scene_group = _scene_group(groups)
+    for cls in (VLM_PG_finding, *filter(None, groups.values()), scene_group):
+        bpy.utils.register_class(cls)
+        undo.callback(bpy.utils.unregister_class, cls)
+    pointer = bpy.props.PointerProperty(type=scene_group, name="Virtual Light Mesh")
+    setattr(bpy.types.Scene, SCENE_PROPERTY, pointer)
+    undo.callback(delattr, bpy.types.Scene, SCENE_PROPERTY)
+
+
+def ensure_scene_settings() -> None:
+    """Give scenes the property `vlm` for good where no extension did: in `python -m vlm_addon`."""
+    if not hasattr(bpy.types.Scene, SCENE_PROPERTY):
+        register_scene_settings(ExitStack())
+
+
+def _group_name(technique: str) -> str:
+    return f"{technique}_settings"
+
+
+def _settings_group(technique: type[Technique]) -> type | None:
+    annotations = property_annotations(technique.settings)
+    name = f"VLM_PG_{technique.name}_settings"
+    return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations}) if annotations else None
+
+
+def _scene_group(groups: dict[str, type | None]) -> type:
     defaults = {field.name: field.default for field in dataclasses.fields(RenderSettings)}
     (target,) = (info for info in describe(SimplifySettings) if info.name == "target_triangles")
     annotations = {
@@ -76,4 +132,7 @@ def scene_property_classes() -> tuple[type, ...]:
         "target_triangles": _property(target),
         "findings": bpy.props.CollectionProperty(type=VLM_PG_finding, name="Findings of the last check"),
     }
-    return VLM_PG_finding, type("VLM_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+    for technique, group in groups.items():
+        if group is not None:
+            annotations[_group_name(technique)] = bpy.props.PointerProperty(type=group)
+    return type("VLM_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations})

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import ExitStack
-from typing import Any
 
 import bpy
 
@@ -24,12 +23,10 @@ def register(operator_classes: Iterable[type]) -> None:
     with ExitStack() as undo:
         undo.callback(KEPT.close)
         undo.callback(_stop_timer)
-        scene_classes = properties.scene_property_classes()
-        for cls in (*scene_classes, *operator_classes, *panels.CLASSES, engine.VLM_RenderEngine):
+        properties.register_scene_settings(undo)
+        for cls in (*operator_classes, *panels.CLASSES, engine.VLM_RenderEngine):
             bpy.utils.register_class(cls)
             undo.callback(bpy.utils.unregister_class, cls)
-        _add_scene_settings(scene_classes[-1])
-        undo.callback(delattr, bpy.types.Scene, properties.SCENE_PROPERTY)
         engine_panels.register()
         undo.callback(engine_panels.unregister)
         handle = cli_commands.register()
@@ -45,8 +42,3 @@ def unregister() -> None:
 def _stop_timer() -> None:
     if bpy.app.timers.is_registered(authoring.render_in_window):
         bpy.app.timers.unregister(authoring.render_in_window)
-
-
-def _add_scene_settings(group: Any) -> None:
-    pointer = bpy.props.PointerProperty(type=group, name="Virtual Light Mesh")
-    setattr(bpy.types.Scene, properties.SCENE_PROPERTY, pointer)

@@ -17,7 +17,10 @@ S = TypeVar("S")
 
 @dataclasses.dataclass(frozen=True)
 class SettingInfo:
-    """What a user may know of one setting: its type, default, unit, inclusive range, tooltip text and source."""
+    """What a user may know of one setting: its type, default, unit, inclusive range, tooltip text and source.
+
+    only_with: the other setting and its value without which this one does nothing; None if it always counts.
+    """
 
     name: str
     type: type
@@ -28,6 +31,7 @@ class SettingInfo:
     text: str
     source: str
     choices: tuple[str, ...]
+    only_with: tuple[str, str] | None
 
 
 def setting(
@@ -39,9 +43,18 @@ def setting(
     *,
     source: str = "",
     choices: tuple[str, ...] = (),
+    only_with: tuple[str, str] | None = None,
 ) -> Any:
-    """A dataclass field that carries its unit, inclusive range, tooltip text and source."""
-    metadata = {"unit": unit, "low": low, "high": high, "text": text, "source": source, "choices": choices}
+    """A dataclass field that carries what SettingInfo says of it."""
+    metadata = {
+        "unit": unit,
+        "low": low,
+        "high": high,
+        "text": text,
+        "source": source,
+        "choices": choices,
+        "only_with": only_with,
+    }
     return dataclasses.field(default=default, metadata=metadata)
 
 
