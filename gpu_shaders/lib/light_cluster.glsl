@@ -7,12 +7,10 @@
 #include "gpu_layout/LightNode"
 #include "gpu_layout/LightCluster"
 
-// A deviation of the normals beyond which cosines are taken to be positive or not at all.
-#define CLUSTER_SOFTNESS 1.6
-
-// How much a cluster's lights count instead of it at p: 1 up to `window` from its centre, 0 from twice that on.
+// How much a cluster's lights count instead of it at p: 1 up to `window` from its centre, 0 from (1 + CLUSTER_FADE)
+// times that on.
 float window_weight(vec3 p, vec3 centre, float window) {
-    float t = clamp(length(p - centre) / window - 1.0, 0.0, 1.0);
+    float t = clamp((length(p - centre) / window - 1.0) * (1.0 / CLUSTER_FADE), 0.0, 1.0);
     return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 

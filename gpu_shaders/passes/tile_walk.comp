@@ -25,7 +25,8 @@ void main() {
     }
     PointGroup group = tiles[pair_tiles[i]];
     LightNode node = nodes[pair_nodes[i]];
-    bool is_open = distance_range(group, node.centre).x < 2.0 * node.window && !cluster_gives_nothing(group, node);
+    bool is_near = distance_range(group, node.centre).x < (1.0 + CLUSTER_FADE) * node.window;
+    bool is_open = is_near && !cluster_gives_nothing(group, node);
     node_counts[i] = is_open ? node.end_child - node.first_child : 0u;
     light_counts[i] = is_open ? node.end_light - node.first_light : 0u;
 }

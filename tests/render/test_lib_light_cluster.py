@@ -10,10 +10,10 @@ from tests.form_factor_cases import single, unit
 from tests.render.rooms import lights_from_triangles
 from tests.render.shader_functions import evaluate
 from vlm_addon.core.light_clusters import LightClusters, cluster_irradiance, light_clusters
+from vlm_addon.core.light_grid import LitTree
 from vlm_addon.core.light_tree import LightTree, build_light_tree
-from vlm_addon.core.light_tree_bounds import facing_height, horizon_height
 from vlm_addon.render.device import Device
-from vlm_addon.render.light_forest import LitTree, make_forest
+from vlm_addon.render.light_forest import make_forest
 from vlm_addon.render.local_space import LocalSpace
 
 PATH = "lib/light_cluster.glsl"

@@ -186,6 +186,7 @@ class RenderProcess:
             device=tree["device"],
             timer=tree["timer"],
             findings=tuple(Finding(**finding) for finding in tree["findings"]),
+            reasons=tuple(tree["reasons"]),
         )
 
     def _next(self, progress: Progress) -> dict[str, Any]:

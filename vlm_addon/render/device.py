@@ -42,7 +42,7 @@ class Device:
         self.name: str = self.context.info["GL_RENDERER"]
         self.is_software = any(word in self.name.lower() for word in SOFTWARE_RENDERERS)
         self.shaders = ShaderLibrary(self.context)
-        self.light_structures = LightStructures()
+        self.light_structures = LightStructures(on_device=not self.is_software)
         # moderngl never deletes a query, so frames share them.
         self._queries: list[Any] = []
 

@@ -61,6 +61,7 @@ def render_frame(
         geometry,
         shadows,
         local_lights,
+        snapshot,
         light_mesh,
         space,
         device.light_structures,
@@ -101,7 +102,8 @@ def render_frame(
         **technique.counters(),
     }
     findings += _scene_findings(snapshot, light_mesh)
-    return Frame(images, timer.timings(), counters, device.name, timer.kind, tuple(findings))
+    reasons = tuple(technique.reasons())
+    return Frame(images, timer.timings(), counters, device.name, timer.kind, tuple(findings), reasons)
 
 
 def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings) -> None:

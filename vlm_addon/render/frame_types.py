@@ -48,7 +48,8 @@ class Frame:
 
     images: float32 (h, w, c) linear Rec.709, row 0 at the top; always `combined` (RGBA, premultiplied), `direct` and
     `indirect` (RGB radiance, W/(m² sr)). timings: (pass name, milliseconds) in order. counters: what was counted
-    (lights, triangles, samples …). device: name of the device; timer: how milliseconds were taken.
+    (lights, triangles, samples …). device: name of the device; timer: how milliseconds were taken. reasons: why a pass
+    ran in another way than was asked for.
     """
 
     images: dict[str, Float32]
@@ -57,3 +58,4 @@ class Frame:
     device: str
     timer: str
     findings: tuple[Finding, ...] = ()
+    reasons: tuple[str, ...] = ()

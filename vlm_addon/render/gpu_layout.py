@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.brdf import MAX_F0
 from ..core.lamps import NARROW_CONE
+from ..core.light_clusters import FADE, SOFTNESS
 
 # GLSL type: (numpy scalar, components, alignment in bytes)
 _STD430: Mapping[str, tuple[str, int, int]] = {
@@ -212,7 +213,8 @@ LIGHT_NODE = GpuStruct(
     ),
 )
 """A cluster of core.light_tree.LightTree in metres from the local origin. centre: its centroid. middle, half_extent: of
-its box. Its clusters are nodes first_child to end_child, its lights those at first_light to end_light in the forest's order."""
+its box. Its clusters are nodes first_child to end_child, its lights those at first_light to end_light in the forest's
+order."""
 
 LIGHT_CLUSTER = GpuStruct(
     "LightCluster",
@@ -231,7 +233,7 @@ LIGHT_CLUSTER = GpuStruct(
     ),
 )
 """What a cluster sends out: core.light_clusters.LightClusters. first_axis, second_axis: from the mean to two of its
-four points. normal: flux over power. variances (xx, yy, zz), covariances (xy, yz, xz): of the normals. power: rgb, W."""
+four points. normal: flux over power. variances (xx, yy, zz), covariances (xy, yz, xz): of normals. power: rgb, W."""
 
 STRUCTS: dict[str, GpuStruct] = {
     struct.name: struct
@@ -296,8 +298,10 @@ CONSTANTS: dict[str, int | float] = {
     # tiles of the map of a cube: +x -x +y / -y +z -z
     "SHADOW_CUBE_COLUMNS": 3,
     "SHADOW_CUBE_ROWS": 2,
-    # bounds of formulas that core states
+    # bounds and widths of formulas that core states
     "MAX_F0": MAX_F0,
     "NARROW_CONE": NARROW_CONE,
+    "CLUSTER_FADE": FADE,
+    "CLUSTER_SOFTNESS": SOFTNESS,
 }
 """Numbers that Python and GLSL share; every shader sees them as `#define`s."""

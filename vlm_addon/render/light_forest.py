@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.light_clusters import LightClusters
-from ..core.light_tree import ROOT, LightTree
+from ..core.light_grid import LitTree
+from ..core.light_tree import ROOT
 from .gpu_layout import LIGHT_CLUSTER, LIGHT_NODE
 from .local_space import LocalSpace
 
@@ -24,14 +25,6 @@ _OPEN_EVERYWHERE = 1e30
 """Window of the parent that a root has not."""
 _DARK = 1e-20
 """Share of the brightest cluster's power below which a cluster is not looked at."""
-
-
-@dataclass(frozen=True)
-class LitTree:
-    """A light tree, and what its clusters send out."""
-
-    tree: LightTree
-    clusters: LightClusters
 
 
 @dataclass(frozen=True)
@@ -113,7 +106,7 @@ def _cluster_records(lit: LitTree, space: LocalSpace) -> np.ndarray:
     records["first_axis"], records["second_axis"] = np.moveaxis(np.sqrt(2.0) * scale * clusters.axes, 1, 0)
     records["parent_window"] = np.where(parent == ROOT, _OPEN_EVERYWHERE, scale * clusters.window[parent])
     records["parent_centre"] = space.local_points(tree.centroid[parent])
-    records["least_squared"] = scale**2 * clusters.least_squared
+    records["least_squared"] = np.where(power > 0.0, scale**2 * clusters.least_squared, 1.0)
     records["normal"] = shared * clusters.flux
     records["variances"] = spread[:, [0, 1, 2], [0, 1, 2]]
     records["covariances"] = spread[:, [0, 1, 0], [1, 2, 2]]

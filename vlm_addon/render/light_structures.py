@@ -7,19 +7,31 @@ They are made in world space from geometry alone, so neither a lamp nor the came
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from ..core.active_hemisphere import HalfBalls
 from ..core.array_codec import content_hash
+from ..core.grid_frame import Bounds, GridFrame, make_frame
 from ..core.light_clusters import light_clusters
+from ..core.light_grid import LitTree
 from ..core.light_mesh import VirtualLightMesh
 from ..core.light_tree import build_light_tree
-from ..core.scene import Float32
-from .light_forest import LitTree
+from ..core.progress import Progress
+from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
+from ..core.scene import Float32, SceneSnapshot
+from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
+from .passes.phase_two_range import GpuRangeGrid
+from .shader_library import ShaderLibrary
+
+if TYPE_CHECKING:
+    import moderngl
 
 T = TypeVar("T")
+Bools = npt.NDArray[np.bool_]
 
 STATIC, DYNAMIC = "static", "dynamic"
 
@@ -27,7 +39,9 @@ STATIC, DYNAMIC = "static", "dynamic"
 class LightStructures:
     """A device's structures. built: how often each kind was made, by name, since the device was opened."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_device: bool) -> None:
+        """on_device: grids are faster made by shaders than by numpy, which software renderers are not."""
+        self._on_device = on_device
         self._kept: dict[str, tuple[str, Any]] = {}
         self.built: dict[str, int] = {}
 
@@ -43,7 +57,7 @@ class LightStructures:
                 continue
             shape = shape_hash(light_mesh, chosen)
 
-            def build(chosen: npt.NDArray[np.bool_] = chosen) -> Any:
+            def build(chosen: Bools = chosen) -> Any:
                 return build_light_tree(light_mesh, chosen)
 
             tree = self.kept(f"{kind}_tree", shape, build)
@@ -54,6 +68,36 @@ class LightStructures:
             # The scale of all light comes into it, so lights that are not in the tree do, too.
             state = f"{shape} {content_hash(light_mesh.areas)} {lit_by}"
             result.append(self.kept(f"{kind}_clusters", state, relight))
+        return result
+
+    def range_grids(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh,
+        settings: RangeSettings,
+        progress: Progress,
+    ) -> list[GpuRangeGrid]:
+        """Grids of the static and of the dynamic lights, without those of no lights; all in world space.
+
+        The static grid lies over the surfaces that do not move, so that one that does leaves it as it is. Raises
+        Cancelled, and DeviceError where the device's blocks are too small.
+        """
+        result = []
+        for kind, chosen in chosen_lights(light_mesh).items():
+            if not chosen.any():
+                continue
+            bounds = _bounds(snapshot, kind == STATIC)
+            key = f"{shape_hash(light_mesh, chosen)} {content_hash([list(bounds), settings])}"
+
+            def build(chosen: Bools = chosen, bounds: Bounds = bounds) -> GpuRangeGrid:
+                if self._on_device:
+                    return _grid_on_device(context, shaders, light_mesh, bounds, settings, chosen, progress)
+                grid = RangeGrid.bake(light_mesh, bounds, settings, progress, chosen)
+                return _gpu_grid(context, grid.frame, grid.half_balls, upload(context, grid.lists))
+
+            result.append(self.kept(f"{kind}_grid", key, build))
         return result
 
     def kept(self, kind: str, key: str, make: Callable[[], T]) -> T:
@@ -68,11 +112,41 @@ class LightStructures:
         return found[1]
 
 
-def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, npt.NDArray[np.bool_]]:
+def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, Bools]:
     """(n,) bool by kind of light."""
     return {STATIC: ~light_mesh.dynamic, DYNAMIC: light_mesh.dynamic}
 
 
-def shape_hash(light_mesh: VirtualLightMesh, chosen: npt.NDArray[np.bool_]) -> str:
+def shape_hash(light_mesh: VirtualLightMesh, chosen: Bools) -> str:
     """Hash of all that a structure over the `chosen` lights depends on."""
     return content_hash([chosen, light_mesh.corners[chosen], light_mesh.tag_ids[chosen]])
+
+
+def _bounds(snapshot: SceneSnapshot, only_static: bool) -> Bounds:
+    """Of the surfaces that do not move, if there are any; else of all."""
+    static = tuple(mesh for mesh in snapshot.meshes if not mesh.dynamic and len(mesh.positions))
+    return replace(snapshot, meshes=static).bounds() if only_static and static else snapshot.bounds()
+
+
+def _grid_on_device(
+    context: moderngl.Context,
+    shaders: ShaderLibrary,
+    light_mesh: VirtualLightMesh,
+    bounds: Bounds,
+    settings: RangeSettings,
+    chosen: Bools,
+    progress: Progress,
+) -> GpuRangeGrid:
+    frame = make_frame(bounds, settings.grid)
+    shapes = light_shapes(light_mesh, frame, settings.range, chosen)
+    lists = LightGridPass(context, shaders).build(shapes.half_balls, frame.edges, progress)
+    if settings.max_lights:
+        grid = RangeGrid.from_lists(settings, frame, shapes, lists.read(), progress)
+        lists = upload(context, grid.lists)
+    return _gpu_grid(context, frame, shapes.half_balls, lists)
+
+
+def _gpu_grid(context: moderngl.Context, frame: GridFrame, half_balls: HalfBalls, lists: GpuBlockLists) -> GpuRangeGrid:
+    offsets = np.frombuffer(lists.offsets.read(), np.uint32).astype(np.int64)
+    records = context.buffer(half_ball_records(half_balls).tobytes())
+    return GpuRangeGrid(frame, lists, records, int(np.diff(offsets).max(initial=0)))

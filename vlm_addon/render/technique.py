@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 class SceneInputs:
     """What stays the same over the samples of a frame.
 
-    light_mesh: None where the caller gave none; world_lights: the same in world space. space: where the others are.
-    structures: what the device keeps over frames. progress: of the work before the first sample.
+    light_mesh: None where the caller gave none. world, world_lights: snapshot and light mesh in world space; space:
+    where the others are. structures: what the device keeps over frames. progress: of the work before the first sample.
     """
 
     context: moderngl.Context
@@ -46,6 +46,7 @@ class SceneInputs:
     geometry: GpuGeometry
     shadows: LampShadows
     light_mesh: VirtualLightMesh | None
+    world: SceneSnapshot
     world_lights: VirtualLightMesh | None
     space: LocalSpace
     structures: LightStructures
@@ -94,6 +95,10 @@ class Technique(ABC):
     def counters(self) -> dict[str, float]:
         """What the technique counted so far in this frame."""
         return {}
+
+    def reasons(self) -> list[str]:
+        """Why it does something in another way than was asked for, a sentence each."""
+        return []
 
 
 @lru_cache(maxsize=1)

@@ -56,6 +56,11 @@ class ClusteredPhaseTwoPass:
         self.entries = 0
         self.tiles = 0
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the buffers that lists were made in."""
+        return self._pool.nbytes
+
     def render(
         self,
         gbuffer: GBuffer,

@@ -7,11 +7,11 @@ import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...core.light_grid import GridSettings
+from ...core.range_grid import RangeSettings
 from ...core.settings import setting
-from ..light_forest import GpuLightForest, make_forest
-from ..passes.phase_one import PhaseOnePass, read_radiosity
-from ..passes.phase_two import PhaseTwoPass
-from ..passes.phase_two_clustered import ClusteredPhaseTwoPass
+from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
+from ..passes.phase_one import PhaseOnePass
 from ..technique import FrameInputs, SceneInputs, Technique
 from ..virtual_lights import GpuVirtualLights
 
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
 
 TOLERANCE, RANGE, ALL = "tolerance", "range", "all"
 FEW_LIGHTS = 400
-"""Up to so many, all lights cost no more than clusters of them."""
+"""Up to so many, the sum over all lights costs no more than the walk to clusters of them (benchmarks/RESULTS.md)."""
+
+
+def _of_grid(name: str, only_with: str) -> Any:
+    """The setting `name` of a light grid, which counts where `lights` is `only_with`."""
+    field = next(field for field in dataclasses.fields(GridSettings) if field.name == name)
+    return dataclasses.field(default=field.default, metadata={**field.metadata, "only_with": ("lights", only_with)})
 
 
 @dataclass(frozen=True)
@@ -36,10 +42,10 @@ class Settings:
         source="002, 4",
         choices=(TOLERANCE, RANGE, ALL),
     )
-    tolerance: float = setting(0.02, "", 1e-4, 1.0, "Error of the irradiance, as a share of it", source="002, 4")
-    grid: int = setting(50, "cells", 1, 256, "Cells along each side of the scene's box", source="002, 4.1")
-    range: float = setting(4.0, "radii", 0.0, 1e6, "How far a light reaches", source="002, 4.2")
-    max_lights: int = setting(0, "lights", 0, 1_000_000, "Most lights a cell holds", source="002, 4.1")
+    tolerance: float = _of_grid("tolerance", TOLERANCE)
+    grid: int = _of_grid("grid", RANGE)
+    range: float = _of_grid("range", RANGE)
+    max_lights: int = _of_grid("max_lights", RANGE)
 
 
 class VirtualLightMeshTechnique(Technique):
@@ -65,45 +71,31 @@ class VirtualLightMeshTechnique(Technique):
             self._radiosity = phase_one.render(
                 scene.light_mesh, scene.geometry.origin, scene.shadows, scene.settings.shadow_samples, scene.progress
             )
-        size = scene.settings.width, scene.settings.height
-        self._pixels = size[0] * size[1]
-        self._built: dict[str, float] = {}
-        self._clustered: ClusteredPhaseTwoPass | None = None
-        self._samples = 0
-        if settings.lights == TOLERANCE and self._lights.count > FEW_LIGHTS:
-            self._clustered = ClusteredPhaseTwoPass(scene.context, scene.shaders, *size)
-            self._forest = self._make_forest()
-        else:
-            self._phase_two = PhaseTwoPass(scene.context, scene.shaders, *size)
-
-    def _make_forest(self) -> GpuLightForest:
-        """The clusters of the lights as they shine now."""
-        scene = self.scene
-        assert scene.world_lights is not None
         before = dict(scene.structures.built)
-        with scene.timer.measure("relight"):
-            radiosity = read_radiosity(self._radiosity, self._lights.count)
-            trees = scene.structures.trees(scene.world_lights, radiosity, self.chosen.tolerance)
-            forest = GpuLightForest(scene.context, make_forest(trees, scene.space, self._lights.count))
-        kinds = ("static_tree", "dynamic_tree", "static_clusters", "dynamic_clusters")
-        after = scene.structures.built
-        self._built = {f"{kind}_built": after.get(kind, 0) - before.get(kind, 0) for kind in kinds}
-        return forest
+        self._sum = self._chosen_sum()
+        kinds = self._sum.kinds
+        self._built = {f"{kind}_built": scene.structures.built.get(kind, 0) - before.get(kind, 0) for kind in kinds}
+
+    def _chosen_sum(self) -> LightSum:
+        """How the lights are summed."""
+        chosen, inputs = self.chosen, (self.scene, self._lights, self._radiosity)
+        if chosen.lights == RANGE:
+            return CellSum(*inputs, RangeSettings(chosen.grid, chosen.range, chosen.max_lights))
+        if chosen.lights == TOLERANCE and self._lights.count > FEW_LIGHTS:
+            return ClusteredSum(*inputs, chosen.tolerance)
+        return FullSum(*inputs)
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the lights of radiosity times form factor."""
-        self._samples += 1
         with self.scene.timer.measure("phase two"):
-            if self._clustered is not None:
-                return self._clustered.render(
-                    frame.gbuffer, self._lights, self._radiosity, self._forest, frame.progress
-                )
-            return self._phase_two.render(frame.gbuffer, self._lights, self._radiosity, frame.progress)
+            return self._sum.render(frame.gbuffer, frame.progress)
 
     def counters(self) -> dict[str, float]:
-        """Virtual lights, what was built, and how many lights and clusters each pixel's list holds on average."""
-        counted: dict[str, float] = {"virtual_lights": self._lights.count, **self._built}
-        if self._clustered is None:
-            return counted | {"evaluations": self._samples * self._pixels * self._lights.count}
-        per_tile = self._clustered.entries / max(self._clustered.tiles, 1)
-        return counted | {"lists_entries": self._clustered.entries, "evaluated_per_pixel": per_tile}
+        """Virtual lights, which structures were built in this frame (0: kept), and what their lists hold."""
+        return {"virtual_lights": self._lights.count, **self._built, **self._sum.counters()}
+
+    def reasons(self) -> list[str]:
+        """Why all lights are summed where a tolerance was asked for."""
+        if self.chosen.lights != TOLERANCE or not isinstance(self._sum, FullSum):
+            return []
+        return [f"all {self._lights.count} virtual lights are summed: that costs no more than clusters of so few"]

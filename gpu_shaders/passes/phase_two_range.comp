@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Irradiance of every pixel from the lights in the list of its cell of a light grid (seed 002, 4.3), added to what other
+// grids gave. A pixel outside the grid gets the lights whose active hemisphere holds it.
+#include "gpu_layout/VirtualLight"
+#define TILE_ACCESS readonly
+#include "passes/tile_pixels.glsl"
+#include "lib/active_hemisphere.glsl"
+#include "lib/block_lists.glsl"
+
+#define BATCH 64u
+
+layout(std430, binding = VIRTUAL_LIGHT_BINDING) readonly buffer VirtualLights { VirtualLight lights[]; };
+layout(std430, binding = RADIOSITY_BINDING) readonly buffer Radiosities { vec4 radiosities[]; }; // W/m², w unused
+layout(std430, binding = LIST_OFFSET_BINDING) readonly buffer ListOffsets { uint list_offsets[]; };
+layout(std430, binding = LIST_BINDING) readonly buffer Entries { uint entries[]; };
+layout(std430, binding = MASK_BINDING) readonly buffer Masks { uvec2 masks[]; };
+layout(std430, binding = HALF_BALL_BINDING) readonly buffer HalfBalls { HalfBall half_balls[]; };
+
+layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²
+
+// Of the grid's frame: places are frame_scale times a position plus frame_offset.
+uniform float frame_scale;
+uniform vec3 frame_offset;
+uniform vec3 low;
+uniform vec3 high;
+uniform uint cells;
+uniform uint light_count;
+// A run within each list.
+uniform uint first_entry;
+uniform uint end_entry;
+
+vec3 light_at(uint i, int k) {
+    VirtualLight light = lights[i];
+    bool is_own = light.tag_id != UNTAGGED && light.tag_id == tag_ids[k];
+    float factor = triangle_form_factor(
+        positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius);
+    return is_own ? vec3(0.0) : factor * radiosities[i].rgb;
+}
+
+vec3 sum_of_cell(vec3 place, int k) {
+    uvec3 cell = cell_of(place, low, high, cells);
+    uint block = block_of(cell, cells);
+    uint start = list_offsets[block], stop = list_offsets[block + 1u];
+    uint end = min(start + end_entry, stop);
+    vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
+    for (uint i = min(start + first_entry, stop); i < end; ++i) {
+        if (has_cell(masks[i], cell)) {
+            batch_sum += light_at(entries[i], k);
+        }
+        if (i % BATCH == BATCH - 1u) {
+            sum += batch_sum;
+            batch_sum = vec3(0.0);
+        }
+    }
+    return sum + batch_sum;
+}
+
+vec3 sum_outside(vec3 place, int k) {
+    vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
+    uint end = min(end_entry, light_count);
+    for (uint i = first_entry; i < end; ++i) {
+        // Exact for a point.
+        if (may_overlap(half_balls[i], place - half_balls[i].centre, place - half_balls[i].centre)) {
+            batch_sum += light_at(i, k);
+        }
+        if (i % BATCH == BATCH - 1u) {
+            sum += batch_sum;
+            batch_sum = vec3(0.0);
+        }
+    }
+    return sum + batch_sum;
+}
+
+void main() {
+    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    if (tiles[tile].half_extent.x < 0.0) {
+        return;
+    }
+    fetch_pixels(tile);
+    for (int k = 0; k < PIXELS; ++k) {
+        if (shown[k]) {
+            vec3 place = frame_scale * positions[k] + frame_offset;
+            // What lies on the grid's face does not leave it by rounding.
+            bool is_inside = all(greaterThanEqual(place, low - FACE_SLACK)) && all(lessThanEqual(place, high + FACE_SLACK));
+            vec3 sum = is_inside ? sum_of_cell(place, k) : sum_outside(place, k);
+            ivec2 pixel = pixel_at(tile, k);
+            imageStore(irradiance, pixel, vec4(imageLoad(irradiance, pixel).rgb + sum, 1.0));
+        }
+    }
+}

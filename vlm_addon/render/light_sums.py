@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ways to sum the virtual lights at the pixels of a frame: all, by clusters within a tolerance, or by grid cells."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+from ..core.progress import Progress
+from ..core.range_grid import RangeSettings
+from .light_forest import GpuLightForest, make_forest
+from .passes.gbuffer import GBuffer
+from .passes.phase_one import read_radiosity
+from .passes.phase_two import PhaseTwoPass
+from .passes.phase_two_clustered import ClusteredPhaseTwoPass
+from .passes.phase_two_range import RangePhaseTwoPass
+from .technique import SceneInputs
+from .virtual_lights import GpuVirtualLights
+
+if TYPE_CHECKING:
+    import moderngl
+
+
+class LightSum(ABC):
+    """One way to sum the lights of a frame. kinds: of the structures that it needs."""
+
+    kinds: tuple[str, ...] = ()
+
+    def __init__(self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer) -> None:
+        """radiosity: of PhaseOnePass."""
+        self.scene = scene
+        self.lights = lights
+        self.radiosity = radiosity
+
+    @abstractmethod
+    def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
+        """Irradiance of each pixel in W/m², RGBA32F."""
+
+    @abstractmethod
+    def counters(self) -> dict[str, float]:
+        """What was counted so far."""
+
+
+class FullSum(LightSum):
+    """Every light for every pixel."""
+
+    def __init__(self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer) -> None:
+        super().__init__(scene, lights, radiosity)
+        self._pass = PhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        self._pictures = 0
+
+    def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
+        """Irradiance of each pixel in W/m², RGBA32F."""
+        self._pictures += 1
+        return self._pass.render(gbuffer, self.lights, self.radiosity, progress)
+
+    def counters(self) -> dict[str, float]:
+        """For how many pairs of a light and a pixel of a sample they were summed."""
+        pixels = self.scene.settings.width * self.scene.settings.height
+        return {"evaluations": self._pictures * pixels * self.lights.count, "evaluated_per_pixel": self.lights.count}
+
+
+class ClusteredSum(LightSum):
+    """Near lights one by one, far ones by clusters, within a tolerance."""
+
+    kinds = ("static_tree", "dynamic_tree", "static_clusters", "dynamic_clusters")
+
+    def __init__(
+        self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer, tolerance: float
+    ) -> None:
+        super().__init__(scene, lights, radiosity)
+        self._pass = ClusteredPhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        assert scene.world_lights is not None
+        with scene.timer.measure("relight"):
+            values = read_radiosity(radiosity, lights.count)
+            trees = scene.structures.trees(scene.world_lights, values, tolerance)
+            self._forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
+
+    def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
+        """Irradiance of each pixel in W/m², RGBA32F."""
+        return self._pass.render(gbuffer, self.lights, self.radiosity, self._forest, progress)
+
+    def counters(self) -> dict[str, float]:
+        """evaluated_per_pixel: lights and clusters in the list of a pixel's tile, mean over tiles that show a surface;
+        those that face away or lie below the horizon of all of it are still left out."""
+        return {
+            "lists_entries": self._pass.entries,
+            "lists_bytes": self._pass.nbytes,
+            "evaluated_per_pixel": self._pass.entries / max(self._pass.tiles, 1),
+        }
+
+
+class CellSum(LightSum):
+    """The lights of the pixel's cell in light grids of range mode."""
+
+    kinds = ("static_grid", "dynamic_grid")
+
+    def __init__(
+        self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer, settings: RangeSettings
+    ) -> None:
+        super().__init__(scene, lights, radiosity)
+        self._pass = RangePhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        assert scene.world_lights is not None
+        with scene.timer.measure("light grid"):
+            self._grids = scene.structures.range_grids(
+                scene.context, scene.shaders, scene.world, scene.world_lights, settings, scene.progress
+            )
+
+    def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
+        """Irradiance of each pixel in W/m², RGBA32F."""
+        space, bounds = self.scene.space, self.scene.world.bounds()
+        return self._pass.render(gbuffer, self.lights, self.radiosity, self._grids, space, bounds, progress)
+
+    def counters(self) -> dict[str, float]:
+        """Pairs of a light and a block of cells in the grids' lists."""
+        return {"lists_entries": sum(grid.lists.pairs for grid in self._grids)}

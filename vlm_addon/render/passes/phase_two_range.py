@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Irradiance of every pixel from the lights of its cell in light grids of range mode (seed 002, 4.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.grid_frame import Bounds, GridFrame
+from ...core.progress import Progress, step
+from ..gpu_layout import HALF_BALL
+from ..local_space import LocalSpace
+from ..shader_library import ShaderLibrary, set_uniforms
+from ..virtual_lights import GpuVirtualLights
+from .gbuffer import GBuffer
+from .light_grid import GpuBlockLists
+from .phase_two import PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
+from .tile_bounds import TileBoundsPass
+from .tile_walk import LIST_BINDING, LIST_OFFSET_BINDING
+
+if TYPE_CHECKING:
+    import moderngl
+
+_MASK_BINDING = 5
+_HALF_BALL_BINDING = 6
+FACE_SLACK = 1e-5
+"""How far outside a grid of side 1 a point counts as on its face: some hundred roundings of a position."""
+
+
+@dataclass(frozen=True)
+class GpuRangeGrid:
+    """A grid of range mode on the device. half_balls: records of HALF_BALL. longest: lights of the fullest block."""
+
+    frame: GridFrame
+    lists: GpuBlockLists
+    half_balls: moderngl.Buffer
+    longest: int
+
+    @property
+    def light_count(self) -> int:
+        """Lights of the light mesh."""
+        return self.half_balls.size // HALF_BALL.dtype.itemsize
+
+
+class RangePhaseTwoPass:
+    """The sum over the lights of each pixel's cell; outside, over those whose active hemisphere holds it."""
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
+        self._context = context
+        self._irradiance = IrradianceImage(context, width, height)
+        self._tile_bounds = TileBoundsPass(context, shaders, width, height)
+        defines = {
+            **PHASE_TWO_DEFINES,
+            "LIST_BINDING": LIST_BINDING,
+            "LIST_OFFSET_BINDING": LIST_OFFSET_BINDING,
+            "MASK_BINDING": _MASK_BINDING,
+            "HALF_BALL_BINDING": _HALF_BALL_BINDING,
+            "FACE_SLACK": FACE_SLACK,
+        }
+        self._shader = shaders.compute("passes/phase_two_range.comp", defines)
+
+    def render(
+        self,
+        gbuffer: GBuffer,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        grids: Sequence[GpuRangeGrid],
+        space: LocalSpace,
+        bounds: Bounds,
+        progress: Progress,
+    ) -> moderngl.Texture:
+        """As PhaseTwoPass.render. space: of the G-buffer and of `lights`. bounds: of the visible scene, world space."""
+        tiles = self._tile_bounds.render(gbuffer)
+        self._irradiance.clear()
+        width, height = tiles.size
+        for done, grid in enumerate(grids):
+            bind_lights(tiles, lights, radiosity)
+            grid.lists.offsets.bind_to_storage_buffer(LIST_OFFSET_BINDING)
+            grid.lists.light_ids.bind_to_storage_buffer(LIST_BINDING)
+            grid.lists.masks.bind_to_storage_buffer(_MASK_BINDING)
+            grid.half_balls.bind_to_storage_buffer(_HALF_BALL_BINDING)
+            set_uniforms(self._shader, {**tiles.uniforms(), **_frame_uniforms(grid, space)})
+            # Points outside look through all lights.
+            most = grid.longest if _holds(grid.frame, bounds) else max(grid.longest, grid.light_count)
+            for first, end in entry_runs(most, width * height):
+                set_uniforms(self._shader, {"first_entry": first, "end_entry": end})
+                self._shader.run(*tiles.grid)
+                self._context.memory_barrier()
+                step(progress, (done + end / most) / len(grids), "phase two")
+        return self._irradiance.texture
+
+
+def _holds(frame: GridFrame, bounds: Bounds) -> bool:
+    """Whether no point within `bounds` is outside the grid."""
+    low, high = frame.local(np.asarray(bounds, np.float64))
+    slack = 0.5 * FACE_SLACK
+    return bool((low >= frame.edges[:, 0] - slack).all() and (high <= frame.edges[:, -1] + slack).all())
+
+
+def _frame_uniforms(grid: GpuRangeGrid, space: LocalSpace) -> dict[str, object]:
+    frame = grid.frame
+    return {
+        "frame_scale": space.unit / frame.unit,
+        "frame_offset": tuple(np.asarray((space.origin - frame.middle) / frame.unit)),
+        "low": tuple(frame.edges[:, 0]),
+        "high": tuple(frame.edges[:, -1]),
+        "cells": frame.cells_per_axis,
+        "light_count": grid.light_count,
+    }
