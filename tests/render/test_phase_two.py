@@ -7,38 +7,17 @@ import numpy as np
 import pytest
 
 from tests.form_factor_cases import room
+from tests.render.pixels import Pixels, expected, radiosity_rows, random_lights
 from tests.render.rooms import lights_from_triangles
 from vlm_addon.core.errors import Cancelled
-from vlm_addon.core.form_factor import polygon_form_factor
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
 from vlm_addon.core.progress import Progress, silent
 from vlm_addon.core.scene import Float32, Float64
 from vlm_addon.render.device import Device
 from vlm_addon.render.passes import phase_two
 from vlm_addon.render.passes.accumulate import read_image
-from vlm_addon.render.passes.gbuffer import GBuffer
 from vlm_addon.render.passes.phase_two import PhaseTwoPass
 from vlm_addon.render.virtual_lights import GpuVirtualLights
-
-SIZE = (21, 37)
-"""Divides by no size of group."""
-
-
-class Pixels:
-    """Random surface points, one a pixel, row 0 at the top; a fifth of the pixels shows nothing."""
-
-    def __init__(self, generator: np.random.Generator, size: tuple[int, int] = SIZE) -> None:
-        shape = (size[1], size[0])
-        self.positions = generator.uniform(-1.0, 1.0, (*shape, 3)).astype(np.float32)
-        normals = generator.normal(size=(*shape, 3))
-        self.normals = (normals / np.linalg.norm(normals, axis=2, keepdims=True)).astype(np.float32)
-        self.tag_ids = generator.integers(0, 4, shape).astype(np.int32)
-        self.shown = generator.random(shape) < 0.8
-
-    def flat(self) -> tuple[Float64, Float64]:
-        """Positions and unit normals of all pixels, (p, 3) float64."""
-        normals = self.normals.reshape(-1, 3).astype(float)
-        return self.positions.reshape(-1, 3).astype(float), normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def irradiance(
@@ -52,39 +31,12 @@ def irradiance(
     """(h, w, 4) of the pass, row 0 at the top."""
     height, width = pixels.shown.shape
     with device.current() as context:
-
-        def upload(values: np.ndarray) -> np.ndarray:
-            image = np.zeros((height, width, 4), values.dtype)
-            image[..., : values.shape[2]] = np.where(pixels.shown[..., None], values, 0)
-            kind = "i4" if values.dtype == np.int32 else "f4"
-            return context.texture((width, height), 4, image[::-1].tobytes(), dtype=kind)
-
-        ids = np.stack([np.zeros_like(pixels.tag_ids), pixels.tag_ids], axis=2)
-        normal, position = upload(pixels.normals), upload(pixels.positions)
-        gbuffer = GBuffer(position, normal, normal, position, position, upload(ids))
-        rows = np.zeros((max(len(lights), 1), 4), np.float32)
-        rows[: len(lights), :3] = radiosity
-        buffer = context.buffer(rows.tobytes())
+        buffer = context.buffer(radiosity_rows(radiosity))
         records = GpuVirtualLights(context, lights, np.zeros(3) if origin is None else origin)
-        return read_image(
-            PhaseTwoPass(context, device.shaders, width, height).render(gbuffer, records, buffer, progress)
+        found = PhaseTwoPass(context, device.shaders, width, height).render(
+            pixels.gbuffer(device), records, buffer, progress
         )
-
-
-def expected(pixels: Pixels, lights: VirtualLightMesh, radiosity: Float32) -> Float64:
-    """(h, w, 3): the sum in float64."""
-    positions, normals = pixels.flat()
-    factors = polygon_form_factor(positions, normals, lights.corners)
-    tags = pixels.tag_ids.reshape(-1, 1)
-    factors = np.where((tags == lights.tag_ids) & (lights.tag_ids != 0), 0.0, factors)
-    total = (factors @ radiosity.astype(float)).reshape(*pixels.shown.shape, 3)
-    return np.where(pixels.shown[..., None], total, 0.0)
-
-
-def random_lights(generator: np.random.Generator, count: int, size: float, spread: float = 1.5) -> VirtualLightMesh:
-    centres = generator.uniform(-spread, spread, (count, 1, 3))
-    corners = (centres + generator.normal(0.0, size, (count, 3, 3))).astype(np.float32)
-    return lights_from_triangles(corners, tag_ids=generator.integers(0, 4, count))
+        return read_image(found)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.2, 0.02], ids=["large", "middle", "small and far"])
