@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -10,17 +13,19 @@ from hypothesis import strategies as st
 
 from tests.light_meshes import random_lights
 from vlm_addon.core import light_grid_file
-from vlm_addon.core.array_codec import content_hash
+from vlm_addon.core.array_codec import content_hash, flatten
 from vlm_addon.core.errors import InvalidInput
-from vlm_addon.core.light_grid import GridSettings, LightGrid
-from vlm_addon.core.light_grid_file import MAGIC, load_light_grid, save_light_grid
+from vlm_addon.core.light_grid import RANGE, GridSettings, LightGrid
+from vlm_addon.core.light_grid_file import MAGIC, VERSION, load_light_grid, save_light_grid
 
 BOX = ((-2.0, -2.0, -1.0), (2.0, 3.0, 1.0))
+SETTINGS = {"range": GridSettings(3, 2.0, 4, RANGE), "tolerance": GridSettings(tolerance=0.3)}
+LIGHTS = replace(random_lights(0, 12), dynamic=np.arange(12) < 5)
 
 
-@pytest.fixture(scope="module")
-def grid():
-    return LightGrid.bake(random_lights(0, 12), BOX, GridSettings(3, 2.0, 4))
+@pytest.fixture(scope="module", params=SETTINGS)
+def grid(request):
+    return LightGrid.bake(LIGHTS, BOX, SETTINGS[request.param])
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +38,7 @@ def whole(grid, tmp_path_factory):
 def refused(path, data):
     path.write_bytes(data)
     with pytest.raises(InvalidInput) as caught:
-        load_light_grid(path)
+        load_light_grid(path, LIGHTS)
     assert caught.value.subject == str(path)
     assert caught.value.problem
     assert caught.value.remedy
@@ -42,12 +47,47 @@ def refused(path, data):
 
 def test_everything_comes_back(grid, tmp_path):
     save_light_grid(grid, tmp_path / "a.vlmgrid")
-    loaded = load_light_grid(tmp_path / "a.vlmgrid")
+    loaded = load_light_grid(tmp_path / "a.vlmgrid", LIGHTS)
     assert content_hash(loaded) == content_hash(grid)
+    assert type(loaded.static) is type(grid.static)
+    assert type(loaded.dynamic) is type(grid.dynamic)
+    assert loaded.settings == grid.settings
     assert loaded.nbytes == grid.nbytes
+    assert loaded.occupancy == grid.occupancy
     points = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 3))
-    for expected, found in zip(grid.candidates(points), loaded.candidates(points), strict=True):
-        assert expected.tolist() == found.tolist()
+    assert content_hash(loaded.candidates(points)) == content_hash(grid.candidates(points))
+
+
+def test_structures_that_are_none_come_back(tmp_path):
+    still = replace(LIGHTS, dynamic=np.zeros(12, bool))
+    grid = LightGrid.bake(still, BOX, SETTINGS["range"])
+    save_light_grid(grid, tmp_path / "a.vlmgrid")
+    loaded = load_light_grid(tmp_path / "a.vlmgrid", still)
+    assert loaded.dynamic is None
+    assert content_hash(loaded) == content_hash(grid)
+
+
+def test_files_of_other_lights_are_refused(grid, whole, tmp_path):
+    path = tmp_path / "a.vlmgrid"
+    path.write_bytes(whole)
+    for other in (random_lights(1, 12), replace(LIGHTS, dynamic=~LIGHTS.dynamic)):
+        with pytest.raises(InvalidInput, match="12 other lights") as caught:
+            load_light_grid(path, other)
+        assert caught.value.subject == str(path)
+
+
+def test_the_layout_is_that_of_the_version():
+    """Whoever changes a class that is written raises VERSION and states the new layout here."""
+    grids = [LightGrid.bake(LIGHTS, BOX, settings) for settings in SETTINGS.values()]
+    layout = sorted({name for grid in grids for name in leaves(flatten(grid)[0])})
+    assert (VERSION, hashlib.sha256(" ".join(layout).encode()).hexdigest()[:16]) == (2, "2c4253e2fc5f62a5")
+
+
+def leaves(tree, path=""):
+    """Dotted names of all fields."""
+    if not isinstance(tree, dict) or "$array" in tree:
+        return [path]
+    return [name for key, value in tree.items() for name in leaves(value, f"{path}.{key}")]
 
 
 def test_the_same_grid_gives_the_same_bytes(grid, whole, tmp_path):
@@ -56,7 +96,7 @@ def test_the_same_grid_gives_the_same_bytes(grid, whole, tmp_path):
 
 
 def test_every_truncation_is_refused(whole, tmp_path):
-    for length in range(len(whole)):
+    for length in (*range(256), *range(256, len(whole), 61), len(whole) - 1):
         refused(tmp_path / "cut.vlmgrid", whole[:length])
 
 
@@ -85,14 +125,14 @@ def test_foreign_files_are_refused(tmp_path, data):
 
 
 def test_other_versions_say_so(whole, tmp_path):
-    newer = whole[:8] + (2).to_bytes(4, "little") + whole[12:]
-    assert "version 2" in refused(tmp_path / "newer.vlmgrid", newer)
+    newer = whole[:8] + (VERSION + 1).to_bytes(4, "little") + whole[12:]
+    assert f"version {VERSION + 1}" in refused(tmp_path / "newer.vlmgrid", newer)
 
 
 def test_missing_files_and_folders_are_refused(grid, tmp_path):
     for path in (tmp_path / "none.vlmgrid", tmp_path):
         with pytest.raises(InvalidInput, match="cannot be read"):
-            load_light_grid(path)
+            load_light_grid(path, LIGHTS)
     for path in (tmp_path / "none" / "a.vlmgrid", tmp_path):
         with pytest.raises(InvalidInput, match="cannot be written"):
             save_light_grid(grid, path)

@@ -99,7 +99,7 @@ def overlaps(half_balls: HalfBalls, low: Floats, high: Floats) -> Bools:
     result |= reached & (_sum(far * far) <= radii_squared)
     doubtful = np.flatnonzero(reached & ~result)
     low, high = np.take(low, doubtful, axis=1), np.take(high, doubtful, axis=1)
-    result[doubtful] = _plane_overlaps(half_balls.take(doubtful), low, high)
+    result[doubtful] = plane_overlaps(half_balls.take(doubtful), low, high)
     return result
 
 
@@ -107,13 +107,13 @@ def _sum(components: Floats) -> Floats:
     return np.asarray((components[0] + components[1]) + components[2])
 
 
-def _plane_overlaps(half_balls: HalfBalls, low: Floats, high: Floats) -> Bools:
-    """(n,) whether the light's disc and the box overlap; the plane cuts the box, whose near point is behind it.
+def plane_overlaps(half_balls: HalfBalls, low: Floats, high: Floats) -> Bools:
+    """(n,) whether the light's disc and a box overlap that `overlaps` finds neither clearly reached nor missed.
 
-    low, high: relative to the centre. The nearest point of the box in the plane is clamp(t n) for the t > 0 at which
-    n clamp(t n) is 0 (the condition of Karush, Kuhn and Tucker). That sum rises with t and is linear between the
-    values of t at which a coordinate starts to move or stops. Products with booleans stand for choices, which numpy
-    makes slowly.
+    The plane cuts the box, whose point nearest to the centre is behind it. low, high: relative to the centre. The
+    nearest point of the box in the plane is clamp(t n) for the t > 0 at which n clamp(t n) is 0 (the condition of
+    Karush, Kuhn and Tucker). That sum rises with t and is linear between the values of t at which a coordinate starts
+    to move or stops. Products with booleans stand for choices, which numpy makes slowly.
     """
     signs = np.copysign(half_balls.normals.dtype.type(1.0), half_balls.normals)
     low, high = np.minimum(low * signs, high * signs), np.maximum(low * signs, high * signs)

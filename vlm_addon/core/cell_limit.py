@@ -3,23 +3,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from .active_hemisphere import HalfBalls
-from .cell_lists import CellLists, expand, lists_from_counts
-from .errors import InvalidInput
+from .active_hemisphere import COORDINATE_STEP, Bools, HalfBalls
+from .block_lists import THREADS, BlockLists
+from .block_masks import CELLS, SIDE, cell_sums, packed
+from .progress import Progress, silent, step
 from .scene import Float32, Float64
 
 Ints = npt.NDArray[Any]
 
-_ENTRIES_PER_BLOCK = 1 << 18
-# A sort key of 64 bits holds which cell of a block (11 bits), a float32 and a place in the cell's list.
-_CELLS_PER_BLOCK = 1 << 11
-_RANK_BITS = 21
+_BLOCKS_PER_TASK = 64
+# Stands for the squared distance 0: of coordinates' rounding.
+_LEAST_SQUARED = np.float32(COORDINATE_STEP**2)
 
 
 @dataclass(frozen=True)
@@ -57,82 +59,95 @@ class Occupancy:
 
 
 def limited(
-    lists: CellLists, half_balls: HalfBalls, edges: Float32, areas: Float64, radii: Float64, max_lights: int
-) -> tuple[CellLists, Occupancy]:
+    lists: BlockLists,
+    half_balls: HalfBalls,
+    edges: Float32,
+    areas: Float64,
+    max_lights: int,
+    progress: Progress = silent,
+) -> tuple[BlockLists, Occupancy]:
     """`lists` with at most `max_lights` lights a cell (0: any number), and what that leaves out.
 
-    A full cell keeps the lights of the greatest bound on their form factor in it, the lower id where bounds are
-    equal as float32. areas, radii: (n,) area and bounding radius of each light, in the grid's frame.
-    Raises InvalidInput where more lights reach one cell than can be ranked, some two million.
+    A full cell keeps the lights of the greatest `disc_form_factors` in it, of equal ones those of lower id.
+    areas: (n,) of each light, in the grid's frame. Raises Cancelled.
     """
-    counts = lists.counts
-    fullest = int(counts.max(initial=0))
-    if max_lights and fullest >= 1 << _RANK_BITS:
-        raise InvalidInput(
-            "light grid", f"{fullest:,} lights reach one cell", "use a shorter range or no greatest list"
-        )
+    bit_counts = lists.bit_counts()
+    counts = lists.cells_from_bits(bit_counts)
     overflowing = np.flatnonzero(counts > max_lights) if max_lights else np.zeros(0, np.int64)
     dropped = np.zeros(len(half_balls), np.uint32)
-    keep = np.ones(len(lists.light_ids), bool) if len(overflowing) else np.zeros(0, bool)
-    for cells in _blocks(overflowing, counts):
-        starts = lists.offsets[cells].astype(np.int64)
-        positions = expand(starts, counts[cells])
-        lights = lists.light_ids[positions]
-        owners = np.repeat(np.arange(len(cells)), counts[cells])
-        bounds = form_factor_bounds(half_balls.take(lights), areas[lights], radii[lights], edges, cells[owners])
-        late_owners, late_ranks = _surplus(owners, positions - starts[owners], bounds, counts[cells], max_lights)
-        surplus = starts[late_owners] + late_ranks
-        keep[surplus] = False
-        dropped += np.bincount(lists.light_ids[surplus], minlength=len(half_balls)).astype(np.uint32)
     if len(overflowing):
-        lists = lists_from_counts(np.minimum(counts, max_lights), lists.light_ids[keep])
-    total = int(counts.sum())
-    entries = len(lists.light_ids)
-    return lists, Occupancy(len(counts), entries, fullest, overflowing.astype(np.uint32), total - entries, dropped)
+        masks, lost = lists.masks.copy(), np.zeros(len(lists.masks), np.uint8)
+
+        def trim(blocks: Ints) -> None:
+            for block in blocks:
+                rows = slice(int(lists.offsets[block]), int(lists.offsets[block + 1]))
+                lights, reached = lists.light_ids[rows], lists.reached(block)
+                place = lists.block_place(block)
+                worth = disc_form_factors(half_balls.take(lights), areas[lights], edges, place)
+                kept = _kept(reached, bit_counts[block], worth, max_lights)
+                masks[rows], lost[rows] = packed(kept), (reached & ~kept).sum(axis=0)
+
+        _in_parallel(trim, np.unique(lists.places(overflowing)[0]), progress)
+        dropped = np.bincount(lists.light_ids, lost, len(half_balls)).astype(np.uint32)
+        lists = lists.with_masks(masks)
+    reached_entries, dropped_entries = int(counts.sum(dtype=np.int64)), int(dropped.sum(dtype=np.int64))
+    return lists, Occupancy(
+        cells=len(counts),
+        entries=reached_entries - dropped_entries,
+        fullest=int(counts.max(initial=0)),
+        overflowing_cells=overflowing.astype(np.uint32),
+        dropped_entries=dropped_entries,
+        cells_dropped_from=dropped,
+    )
 
 
-def form_factor_bounds(
-    half_balls: HalfBalls, areas: Float64, radii: Float64, edges: Float32, cells: npt.NDArray[Any]
-) -> Float64:
-    """(m,) float64: no point of cell i gets more than this share of the radiosity of light i as irradiance.
+def _in_parallel(work: Callable[[Ints], None], blocks: Ints, progress: Progress) -> None:
+    tasks = np.array_split(blocks, -(-len(blocks) // _BLOCKS_PER_TASK))
+    with ThreadPoolExecutor(THREADS) as pool:
+        running = [pool.submit(work, some) for some in tasks]
+        try:
+            for k, task in enumerate(running):
+                task.result()
+                step(progress, (k + 1) / len(running), "full cells")
+        finally:
+            for task in running:
+                task.cancel()
 
-    With rho the light's bounding radius, d the least distance from its centre to the cell and h the greatest height
-    of the cell over its plane: 1, rho² / d² (of its bounding ball) and A cos' / (pi (d - rho)²), cos' <= h / (d - rho).
+
+def disc_form_factors(half_balls: HalfBalls, areas: Float64, edges: Float32, place: Ints) -> Float32:
+    """(CELLS, m) float32: about the greatest form factor of each light at a point of each of a block's cells.
+
+    Of a disc of the light's area A, seen by what faces it: A cos' / (pi d² + A) with the least distance d of its centre
+    from the cell and cos' <= h / d for the greatest height h of the cell over its plane; exact over the disc's middle.
+    half_balls, areas: of m lights, in the grid's frame. place: (3,) of the block along the axes.
     """
-    per_axis = edges.shape[1] - 1
-    indices = np.stack((cells % per_axis, cells // per_axis % per_axis, cells // per_axis**2))
-    axes = np.arange(3)[:, None]
-    low = edges[axes, indices].astype(np.float64) - half_balls.centres
-    high = edges[axes, indices + 1].astype(np.float64) - half_balls.centres
-    distances = np.linalg.norm(np.maximum(low, np.minimum(high, 0.0)), axis=0)
-    heights = np.maximum(half_balls.normals * low, half_balls.normals * high).sum(axis=0)
-    outside = distances > radii
-    gaps = np.where(outside, distances - radii, 1.0)
-    by_ball = (radii / np.where(outside, distances, 1.0)) ** 2
-    by_area = areas * np.clip(heights / gaps, 0.0, 1.0) / (np.pi * gaps * gaps)
-    return np.where(outside, np.minimum(np.minimum(by_ball, by_area), 1.0), 1.0)
+    cells = np.minimum(SIDE * place[:, None] + np.arange(SIDE), edges.shape[1] - 2)
+    near_terms, height_terms = [], []
+    for faces, along, centre, normal in zip(edges, cells, half_balls.centres, half_balls.normals, strict=True):
+        low, high = faces[along][:, None] - centre, faces[along + 1][:, None] - centre
+        near_terms.append(np.square(np.maximum(low, np.minimum(high, 0.0))))
+        height_terms.append(np.maximum(normal * low, normal * high))
+    squared = np.maximum(cell_sums(*near_terms).reshape(CELLS, -1), _LEAST_SQUARED)
+    heights = cell_sums(*height_terms).reshape(CELLS, -1)
+    shares = (areas / np.pi).astype(np.float32)
+    cosines = np.clip(heights / np.sqrt(squared), 0.0, 1.0)
+    return np.asarray(shares * cosines / (squared + shares))
 
 
-def _surplus(owners: Ints, ranks: Ints, bounds: Float64, counts: Ints, max_lights: int) -> tuple[Ints, Ints]:
-    """Owner and rank by id of the entries that do not fit.
+def _kept(reached: Bools, counts: Ints, worth: Float32, most: int) -> Bools:
+    """(CELLS, m) what stays of `reached` where at most `most` lights of a cell do: the best, of equal ones the first.
 
-    One sort of one integer for each entry: owner, then falling bound (the bits of a positive float rise with it), then
-    rank.
+    counts: (CELLS,) lights that reach each cell. worth: (CELLS, m), not negative.
     """
-    falling = ~bounds.astype(np.float32).view(np.uint32)
-    keys = owners.astype(np.uint64) << np.uint64(_RANK_BITS + 32)
-    keys |= falling.astype(np.uint64) << np.uint64(_RANK_BITS)
-    keys |= ranks.astype(np.uint64)
-    keys.sort()
-    place = np.arange(len(keys)) - np.repeat(np.cumsum(counts) - counts, counts)
-    late = place >= max_lights
-    return owners[late], (keys[late] & np.uint64((1 << _RANK_BITS) - 1)).astype(np.int64)
-
-
-def _blocks(cells: Ints, counts: Ints) -> list[Ints]:
-    """`cells` in groups of some _ENTRIES_PER_BLOCK entries and at most _CELLS_PER_BLOCK cells."""
-    if not len(cells):
-        return []
-    by_entries = np.cumsum(counts[cells]) // _ENTRIES_PER_BLOCK
-    by_cells = np.arange(len(cells)) // _CELLS_PER_BLOCK
-    return np.split(cells, np.flatnonzero((np.diff(by_entries) > 0) | (np.diff(by_cells) > 0)) + 1)
+    full = np.flatnonzero(counts > most)
+    ranks = np.where(reached[full], worth[full], np.float32(-1.0))
+    last = ranks.shape[1] - most
+    ordered = np.partition(ranks, last, axis=1)
+    least = ordered[:, last, None]
+    kept = ranks >= least
+    crowded = np.flatnonzero((ordered[:, :last] == least).any(axis=1))
+    above, equal = ranks[crowded] > least[crowded], ranks[crowded] == least[crowded]
+    kept[crowded] = above | (equal & (above.sum(axis=1)[:, None] + np.cumsum(equal, axis=1) <= most))
+    result = reached.copy()
+    result[full] = kept
+    return result

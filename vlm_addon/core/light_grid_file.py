@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light grids in files: a magic word, a version, the length and the SHA-256 of what follows, a JSON tree, the arrays.
 
-A file is written whole or not at all and read whole or refused.
+A file is written whole or not at all and read whole or refused. VERSION rises with every change of the classes that
+are written.
 """
 
 from __future__ import annotations
@@ -12,20 +13,20 @@ import json
 import os
 import struct
 import tempfile
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
-from .active_hemisphere import HalfBalls
 from .array_codec import flatten, unflatten
-from .cell_limit import Occupancy
-from .cell_lists import CellLists
 from .errors import InvalidInput
-from .light_grid import GridFrame, GridSettings, LightGrid
+from .light_grid import RANGE, GridSettings, LightGrid, LitTree
+from .light_mesh import VirtualLightMesh
+from .range_grid import RangeGrid
 
 MAGIC = b"VLMGRID\n"
-VERSION = 1
+VERSION = 2
 # Magic word, version, length of the body, SHA-256 of all these and of the body.
 _HEADER = struct.Struct("<8sIQ32s")
 _TREE_LENGTH = struct.Struct("<Q")
@@ -64,12 +65,23 @@ def save_light_grid(grid: LightGrid, path: Path | str) -> None:
             os.unlink(name)
 
 
-def load_light_grid(path: Path | str) -> LightGrid:
-    """The grid that `save_light_grid` wrote.
+def load_light_grid(path: Path | str, light_mesh: VirtualLightMesh) -> LightGrid:
+    """The grid that `save_light_grid` wrote, of these very lights.
 
-    Raises InvalidInput, one sentence, for a file that is missing, of another kind or version, cut short or damaged.
+    Raises InvalidInput, one sentence, for a file that is missing, of another kind or version, cut short or damaged, or
+    of another light mesh.
     """
     path = Path(path)
+    grid = _grid(_checked_body(path))
+    try:
+        grid.require_made_of(light_mesh)
+    except InvalidInput as error:
+        raise InvalidInput(str(path), error.problem, error.remedy) from None
+    return grid
+
+
+def _checked_body(path: Path) -> memoryview:
+    """What follows the header, after all checks."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -88,7 +100,7 @@ def load_light_grid(path: Path | str) -> LightGrid:
         raise InvalidInput(str(path), problem, _READ_REMEDY)
     if _digest(version, [body]) != digest:
         raise InvalidInput(str(path), "it is damaged (its checksum does not match)", _READ_REMEDY)
-    return _grid(body)
+    return body
 
 
 def _grid(body: memoryview) -> LightGrid:
@@ -105,14 +117,19 @@ def _grid(body: memoryview) -> LightGrid:
         size = count * dtype.itemsize
         start += size + -size % _ALIGNMENT
     values: dict[str, Any] = unflatten(described["tree"], arrays)
-    return LightGrid(
-        settings=GridSettings(**values["settings"]),
-        frame=GridFrame(**values["frame"]),
-        half_balls=HalfBalls(**values["half_balls"]),
-        lists=CellLists(**values["lists"]),
-        occupancy=Occupancy(**values["occupancy"]),
-        light_hash=values["light_hash"],
-    )
+    settings = GridSettings(**values["settings"])
+    structure = RangeGrid if settings.mode == RANGE else LitTree
+    for name in ("static", "dynamic"):
+        if values[name] is not None:
+            values[name] = _made(structure, values[name])
+    return LightGrid(**{**values, "settings": settings})
+
+
+def _made(kind: Any, tree: dict[str, Any]) -> Any:
+    """The dataclass `kind`, and those within it, from the tree of its fields."""
+    types = get_type_hints(kind)
+    names = [field.name for field in fields(kind)]
+    return kind(**{name: _made(types[name], tree[name]) if is_dataclass(types[name]) else tree[name] for name in names})
 
 
 def _digest(version: int, body: list[Any]) -> bytes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lists of a light grid by compute shaders: the same, bit for bit, as core/cell_lists.py makes.
+"""The lists of a light grid by compute shaders: the same, bit for bit, as core/block_lists.py makes.
 
 From large blocks of cells to small ones: a block tests the lights of the larger block that holds it. Each size counts,
 sums up the counts and writes, so nothing depends on the order in which a device does things.
@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.active_hemisphere import HalfBalls
-from ...core.cell_lists import CellLists
+from ...core.block_lists import BlockLists
+from ...core.block_masks import SIDE
 from ...core.errors import DeviceError
 from ...core.progress import Progress, silent, step
 from ...core.scene import Float32
@@ -31,8 +32,9 @@ BRANCHING = 4
 # Invocations that keep a large device busy: long lists of few blocks are shared among several.
 ENOUGH_INVOCATIONS = 1 << 16
 LEAST_LIGHTS_PER_PART = 64
-# Mesa's llvmpipe ends an invocation's loops after 65,535 rounds in all, without a word.
+# Mesa's llvmpipe ends an invocation's loops after 65,535 rounds in all, without a word. A mask takes up to 16 + 64.
 MOST_LIGHTS_PER_PART = 1 << 15
+MOST_MASKS_PER_PART = 1 << 9
 # Invocations in one dispatch, so that a software renderer hears of a cancellation.
 INVOCATIONS_PER_DISPATCH = 1 << 18
 MAX_GROUPS_PER_AXIS = 65535
@@ -45,6 +47,7 @@ _BINDINGS = (
     "PARENT_LIGHT_BINDING",
     "POSITION_BINDING",
     "LIGHT_BINDING",
+    "MASK_BINDING",
 )
 _DEFINES = {name: binding for binding, name in enumerate(_BINDINGS)} | {
     "VALUE_BINDING": 0,
@@ -56,16 +59,33 @@ _DEFINES = {name: binding for binding, name in enumerate(_BINDINGS)} | {
 
 
 @dataclass(frozen=True)
-class GpuCellLists:
-    """Lists of cells on the device, as core.cell_lists.CellLists: offsets (cells + 1) and light_ids, uint32."""
+class GpuBlockLists:
+    """Lists on the device, as core.block_lists.BlockLists; `lib/block_lists.glsl` finds a point's place in them.
 
+    offsets: (blocks + 1) uint. light_ids: (pairs) uint. masks: (pairs) uvec2. The latter two hold at least one element.
+    """
+
+    cells_per_axis: int
     offsets: moderngl.Buffer
     light_ids: moderngl.Buffer
-    entries: int
+    masks: moderngl.Buffer
+    pairs: int
 
-    def read(self) -> CellLists:
+    def read(self) -> BlockLists:
         """The lists on the host."""
-        return CellLists(_uints(self.offsets), _uints(self.light_ids)[: self.entries])
+        masks = np.frombuffer(self.masks.read(8 * self.pairs), np.uint64) if self.pairs else np.zeros(0, np.uint64)
+        return BlockLists(self.cells_per_axis, _uints(self.offsets), _uints(self.light_ids)[: self.pairs], masks)
+
+
+def upload(context: moderngl.Context, lists: BlockLists) -> GpuBlockLists:
+    """`lists` on the device."""
+    return GpuBlockLists(
+        cells_per_axis=lists.cells_per_axis,
+        offsets=context.buffer(lists.offsets.tobytes()),
+        light_ids=context.buffer(lists.light_ids.tobytes() or bytes(4)),
+        masks=context.buffer(lists.masks.tobytes() or bytes(8)),
+        pairs=len(lists.light_ids),
+    )
 
 
 @dataclass(frozen=True)
@@ -87,29 +107,13 @@ class _Blocks:
     positions: moderngl.Buffer
 
     @property
-    def count(self) -> int:
-        """Blocks along all axes."""
-        return self.per_axis**3
-
-    @property
     def slots(self) -> int:
         """Parts of all blocks."""
-        return self.count * self.parts
+        return self.per_axis**3 * self.parts
 
     def offsets(self) -> npt.NDArray[np.uint32]:
-        """(count + 1,): where each block begins, and the entries of all."""
+        """(blocks + 1,): where each block begins, and the entries of all."""
         return _uints(self.positions)[:: self.parts]
-
-
-@dataclass(frozen=True)
-class _Counted:
-    """Cells whose lists are counted, and the blocks and lights that they are to be filled from."""
-
-    inputs: _Inputs
-    cells: _Blocks
-    parents: _Blocks
-    parent_lights: moderngl.Buffer
-    entries: int
 
 
 class LightGridPass:
@@ -118,8 +122,8 @@ class LightGridPass:
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
         self._context = context
         self._refine = {
-            (exact, fill): shaders.compute("passes/light_grid_refine.comp", {**_DEFINES, "EXACT": exact, "FILL": fill})
-            for exact in (False, True)
+            (masks, fill): shaders.compute("passes/light_grid_refine.comp", {**_DEFINES, "MASKS": masks, "FILL": fill})
+            for masks in (False, True)
             for fill in (False, True)
         }
         self._sum = {
@@ -128,77 +132,35 @@ class LightGridPass:
         }
         self._block_limit = int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
 
-    def build(self, half_balls: HalfBalls, edges: Float32, progress: Progress = silent) -> GpuCellLists:
-        """The lights whose half ball overlaps each cell, on the device; arguments as `build_cell_lists`.
+    def build(self, half_balls: HalfBalls, edges: Float32, progress: Progress = silent) -> GpuBlockLists:
+        """The lights whose half ball overlaps each cell, on the device; arguments as `build_block_lists`.
 
-        Raises DeviceError where the device's blocks are too small for the lists, Cancelled when `progress` says so.
+        From one block that holds all cells and lights down to the smallest. Raises DeviceError where the device's
+        storage blocks are too small for the lists, Cancelled when `progress` says so.
         """
-        counted = self._counted(half_balls, edges, progress)
-        lights = self._buffer(counted.entries)
-        self._fill(counted, lights, (0, counted.cells.count), 0, progress)
-        cells = counted.cells
-        offsets = cells.positions if cells.parts == 1 else self._uploaded(cells.offsets())
-        return GpuCellLists(offsets, lights, counted.entries)
-
-    def build_lists(self, half_balls: HalfBalls, edges: Float32, progress: Progress = silent) -> CellLists:
-        """The same on the host, however long the lists are. Raises DeviceError, Cancelled."""
-        counted = self._counted(half_balls, edges, progress)
-        offsets = counted.cells.offsets()
-        light_ids = np.empty(counted.entries, np.uint32)
-        ranges = list(_ranges(offsets, self._block_limit // 4))
-        lights = self._buffer(max(int(offsets[end]) - int(offsets[first]) for first, end in ranges))
-        for first, end in ranges:
-            start, stop = int(offsets[first]), int(offsets[end])
-            if start < stop:
-                self._fill(counted, lights, (first, end), start, progress)
-                light_ids[start:stop] = np.frombuffer(lights.read(4 * (stop - start)), np.uint32)
-        return CellLists(offsets, light_ids)
-
-    def _counted(self, half_balls: HalfBalls, edges: Float32, progress: Progress) -> _Counted:
-        """From one block that holds all cells and lights down to the lists of the cells, which are counted only."""
         records = half_ball_records(half_balls).tobytes() or bytes(HALF_BALL.dtype.itemsize)
         faces = self._context.buffer(np.ascontiguousarray(edges, np.float32).tobytes())
         inputs = _Inputs(self._context.buffer(records), faces, edges.shape[1] - 1)
         total = longest = len(half_balls)
-        blocks = _Blocks(BRANCHING * inputs.cells_per_axis, 1, 1, self._uploaded(np.array([0, total])))
+        blocks = _Blocks(BRANCHING * max(inputs.cells_per_axis, SIDE), 1, 1, self._uploaded(np.array([0, total])))
         lights = self._uploaded(np.arange(max(total, 1)))
+        masks = None
         for side in _sides(inputs.cells_per_axis):
             if BRANCHING**3 * total >= 2**32:
                 raise DeviceError("the light grid may have 2^32 entries or more; use a smaller grid or range")
             per_axis = -(-inputs.cells_per_axis // side)
-            parts = _parts(per_axis**3, longest)
-            children = _Blocks(side, per_axis, parts, self._buffer(per_axis**3 * parts + 1))
-            self._run(inputs, children, blocks, lights, None, (0, children.count), 0, progress)
+            parts = _parts(per_axis**3, longest, MOST_MASKS_PER_PART if side == SIDE else MOST_LIGHTS_PER_PART)
+            children = _Blocks(side, per_axis, parts, self._buffer(4 * (per_axis**3 * parts + 1)))
+            self._run(inputs, children, blocks, lights, None, None, progress)
             self._sum_up(children.positions, children.slots + 1)
-            if side == 1:
-                break
-            offsets = children.offsets().astype(np.int64)
-            total, longest = int(offsets[-1]), int(np.diff(offsets).max())
-            child_lights = self._buffer(total)
-            self._run(inputs, children, blocks, lights, child_lights, (0, children.count), 0, progress)
+            offsets = children.offsets()
+            total, longest = int(offsets[-1]), int(np.diff(offsets.astype(np.int64)).max())
+            masks = self._buffer(8 * total) if side == SIDE else None
+            child_lights = self._buffer(4 * total)
+            self._run(inputs, children, blocks, lights, child_lights, masks, progress)
             blocks, lights = children, child_lights
-        entries = int(np.frombuffer(children.positions.read(4, offset=4 * children.slots), np.uint32)[0])
-        return _Counted(inputs, children, blocks, lights, entries)
-
-    def _fill(
-        self,
-        counted: _Counted,
-        lights: moderngl.Buffer,
-        cell_range: tuple[int, int],
-        first_light: int,
-        progress: Progress,
-    ) -> None:
-        """Writes the lists of a range of cells, of which the first begins at position `first_light` of all lists."""
-        self._run(
-            counted.inputs,
-            counted.cells,
-            counted.parents,
-            counted.parent_lights,
-            lights,
-            cell_range,
-            first_light,
-            progress,
-        )
+        assert masks is not None
+        return GpuBlockLists(inputs.cells_per_axis, self._uploaded(offsets), lights, masks, total)
 
     def _run(
         self,
@@ -207,16 +169,15 @@ class LightGridPass:
         parents: _Blocks,
         parent_lights: moderngl.Buffer,
         lights: moderngl.Buffer | None,
-        block_range: tuple[int, int],
-        first_light: int,
+        masks: moderngl.Buffer | None,
         progress: Progress,
     ) -> None:
-        """Counts the lights of a range of blocks, or writes them to `lights`, whose first has position first_light."""
-        buffers = (inputs.half_balls, inputs.edges, parents.positions, parent_lights, blocks.positions, lights)
+        """Counts the lights of blocks, or writes them to `lights`, and masks of the smallest blocks to `masks`."""
+        buffers = (inputs.half_balls, inputs.edges, parents.positions, parent_lights, blocks.positions, lights, masks)
         for binding, buffer in enumerate(buffers):
             if buffer is not None:
                 buffer.bind_to_storage_buffer(binding)
-        shader = self._refine[blocks.side == 1, lights is not None]
+        shader = self._refine[blocks.side == SIDE, lights is not None]
         values = {
             "cells_per_axis": inputs.cells_per_axis,
             "side": blocks.side,
@@ -224,11 +185,9 @@ class LightGridPass:
             "parents_per_axis": parents.per_axis,
             "parent_parts": parents.parts,
             "parts": blocks.parts,
-            "first_light": first_light,
         }
-        first, end = (block * blocks.parts for block in block_range)
-        for start in range(first, end, INVOCATIONS_PER_DISPATCH):
-            stop = min(start + INVOCATIONS_PER_DISPATCH, end)
+        for start in range(0, blocks.slots, INVOCATIONS_PER_DISPATCH):
+            stop = min(start + INVOCATIONS_PER_DISPATCH, blocks.slots)
             set_uniforms(shader, {**values, "first": start, "end": stop})
             self._dispatch(shader, stop - start)
             step(progress, stop / blocks.slots, "light grid")
@@ -254,40 +213,31 @@ class LightGridPass:
         shader.run(wide, -(-groups // wide))
         self._context.memory_barrier()
 
-    def _buffer(self, count: int) -> moderngl.Buffer:
-        size = 4 * max(count, 1)
+    def _buffer(self, size: int) -> moderngl.Buffer:
+        """A buffer of `size` bytes, or of a few where that is 0."""
         if size > self._block_limit:
             needs, holds = (f"{1e-6 * size:,.0f} MB" for size in (size, self._block_limit))
             raise DeviceError(f"the light grid needs a block of {needs}, the device holds {holds}; use a smaller grid")
-        return self._context.buffer(reserve=size)
+        return self._context.buffer(reserve=max(size, 8))
 
     def _uploaded(self, values: npt.NDArray[Any]) -> moderngl.Buffer:
         return self._context.buffer(values.astype(np.uint32).tobytes())
 
 
 def _sides(cells_per_axis: int) -> Iterator[int]:
-    """Cells along the blocks of each size, from the largest that does not hold all cells to 1."""
-    side = 1
+    """Cells along the blocks of each size, from the largest that does not hold all cells to SIDE."""
+    side = SIDE
     while side * BRANCHING < cells_per_axis:
         side *= BRANCHING
-    while side >= 1:
+    while side >= SIDE:
         yield side
         side //= BRANCHING
 
 
-def _parts(blocks: int, longest: int) -> int:
-    """Into how many parts the lists that blocks look through are cut."""
+def _parts(blocks: int, longest: int, most: int) -> int:
+    """Into how many parts the lists that blocks look through are cut; `most`: lights in a part."""
     wanted = min(ENOUGH_INVOCATIONS // blocks, longest // LEAST_LIGHTS_PER_PART)
-    return max(1, wanted, -(-longest // MOST_LIGHTS_PER_PART))
-
-
-def _ranges(offsets: npt.NDArray[np.uint32], most: int) -> Iterator[tuple[int, int]]:
-    """First and end of runs of cells whose lists together hold at most `most` lights, or of one cell."""
-    first = 0
-    while first < len(offsets) - 1:
-        end = int(np.searchsorted(offsets, int(offsets[first]) + most, "right")) - 1
-        first, start = max(end, first + 1), first
-        yield start, first
+    return max(1, wanted, -(-longest // most))
 
 
 def half_ball_records(half_balls: HalfBalls) -> np.ndarray:
