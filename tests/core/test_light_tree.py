@@ -75,15 +75,15 @@ def test_every_light_is_in_a_cluster_that_holds_it(lights: VirtualLightMesh, tre
     for light in range(0, len(lights), 97):
         line = chain(tree, light)
         assert line
-        assert (np.diff(tree.level[line]) == 1).all()
+        assert (np.diff(tree.level[line]) >= 1).all()
         for cluster in line:
             reach = np.linalg.norm(lights.corners[light] - tree.centroid[cluster], axis=1).max()
             assert reach <= tree.radius[cluster] * (1 + 1e-12)
 
 
 def test_sums_reach_the_roots(lights: VirtualLightMesh, tree: LightTree) -> None:
-    total = tree.sums(lights.areas)
-    assert total[tree.parent == ROOT].sum() == pytest.approx(lights.areas.sum(), rel=1e-12)
+    total = tree.sums(lights.areas[None])[0]
+    assert total[tree.roots].sum() == pytest.approx(lights.areas.sum(), rel=1e-12)
 
 
 def test_weights_along_every_line_to_the_root_add_up_to_one(lights: VirtualLightMesh, tree: LightTree) -> None:
@@ -123,7 +123,7 @@ def test_error_stays_within_the_tolerance(
     full = polygon_form_factor(points, normals, lights.corners) @ radiosity
     clusters = light_clusters(tree, lights, radiosity, tolerance)
     tags = np.zeros(len(points), np.int32)
-    found, _ = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
+    found = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags).irradiance
     reference = np.maximum(full.sum(axis=1), 0.1 * full.sum(axis=1).mean())
     error = np.abs(found - full).sum(axis=1) / reference
     assert np.quantile(error, 0.95) <= tolerance
@@ -135,12 +135,12 @@ def test_a_coarser_tolerance_evaluates_less(lights: VirtualLightMesh, tree: Ligh
     points, normals = surface_points(lights, 40)
     tags = np.zeros(len(points), np.int32)
     evaluated = []
-    for tolerance in (0.01, 0.1, 1.0):
+    for tolerance in (0.001, 0.01, 0.1):
         clusters = light_clusters(tree, lights, radiosity, tolerance)
-        _, counts = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
-        evaluated.append(counts.mean())
+        cut = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
+        evaluated.append(cut.evaluated.mean())
     assert len(lights) > evaluated[0] > evaluated[1] > evaluated[2]
-    assert evaluated[2] < 0.5 * len(lights)
+    assert evaluated[2] < 0.1 * len(lights)
 
 
 def test_a_line_over_the_wall_has_no_step(lights: VirtualLightMesh, tree: LightTree) -> None:
@@ -152,7 +152,7 @@ def test_a_line_over_the_wall_has_no_step(lights: VirtualLightMesh, tree: LightT
         points = np.column_stack([np.linspace(0.2, 0.5, count), np.full(count, 0.31), np.full(count, 1e-4)])
         normals = np.tile((0.0, 0.0, 1.0), (count, 1))
         tags = np.zeros(count, np.int32)
-        values, _ = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags)
+        values = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags).irradiance
         return float(np.abs(np.diff(values.sum(axis=1))).max())
 
     assert largest_step(801) < 0.6 * largest_step(401)
@@ -164,8 +164,8 @@ def test_lights_of_the_own_tag_give_exactly_nothing(lights: VirtualLightMesh) ->
     radiosity = np.where(tagged.tag_ids[:, None] == 7, 1.0, 0.0) * np.ones(3)
     clusters = light_clusters(tree, tagged, radiosity, 0.1)
     points, normals = surface_points(tagged, 50)
-    own, _ = cut_irradiance(tree, clusters, tagged, radiosity, points, normals, np.full(50, 7, np.int32))
-    others, _ = cut_irradiance(tree, clusters, tagged, radiosity, points, normals, np.full(50, 5, np.int32))
+    own = cut_irradiance(tree, clusters, tagged, radiosity, points, normals, np.full(50, 7, np.int32)).irradiance
+    others = cut_irradiance(tree, clusters, tagged, radiosity, points, normals, np.full(50, 5, np.int32)).irradiance
     assert not own.any()
     assert others.any()
 
@@ -181,7 +181,7 @@ def test_a_flat_cluster_far_away_is_its_lights(tree: LightTree, lights: VirtualL
     full = float(polygon_form_factor(points, -direction[None], wall.corners).sum()) * 3.0
     roots = np.flatnonzero(own.parent == ROOT)
     towards = np.repeat(points, len(roots), axis=0), np.repeat(-direction[None], len(roots), axis=0)
-    assert cluster_irradiance(clusters, roots, *towards).sum() == pytest.approx(full, rel=2e-3)
+    assert cluster_irradiance(own, clusters, roots, *towards).sum() == pytest.approx(full, rel=2e-3)
 
 
 def test_no_lights_and_no_power_give_nothing() -> None:
@@ -192,9 +192,9 @@ def test_no_lights_and_no_power_give_nothing() -> None:
     clusters = light_clusters(dark_tree, dark, np.zeros((len(dark), 3)), 0.02)
     points, normals = surface_points(dark, 10)
     tags = np.zeros(10, np.int32)
-    values, counts = cut_irradiance(dark_tree, clusters, dark, np.zeros((len(dark), 3)), points, normals, tags)
-    assert not values.any()
-    assert not counts.any()
+    cut = cut_irradiance(dark_tree, clusters, dark, np.zeros((len(dark), 3)), points, normals, tags)
+    assert not cut.irradiance.any()
+    assert not cut.evaluated.any()
 
 
 @pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
@@ -208,5 +208,5 @@ def test_scale_changes_nothing(scale: float) -> None:
         tree = build_light_tree(lights_of)
         radiosity = smooth_radiosity(small)
         clusters = light_clusters(tree, lights_of, radiosity, 0.05)
-        results.append(cut_irradiance(tree, clusters, lights_of, radiosity, at, normals, tags)[0])
+        results.append(cut_irradiance(tree, clusters, lights_of, radiosity, at, normals, tags).irradiance)
     np.testing.assert_allclose(results[1], results[0], rtol=1e-6)

@@ -2,138 +2,257 @@
 """Clusters of virtual lights on nested grids: what of a light mesh counts one by one, and what counts together.
 
 Cells of level l are 2^l times as large as the finest. A light enters at the level of its own size, so that a long wall
-is not cut up and dust is not met one by one; a cluster holds the lights and clusters one level finer whose centroids
-lie in its cell, which face the same of six ways and share a tag. Nothing here depends on radiosity: relighting leaves
-the tree as it is. Relatives: light cuts (Walter et al. 2005), lighting grid hierarchies (Lin and Yuksel 2019).
+is not cut up and dust is not met one by one; a cluster holds the lights and finer clusters, two or more, whose
+centroids lie in its cell, which face the same of six ways and share a tag. Nothing here depends on radiosity:
+relighting leaves the tree as it is. Relatives: light cuts (Walter et al. 2005), lighting grid hierarchies (Lin and
+Yuksel 2019).
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from .light_mesh import VirtualLightMesh
+from .light_tree_bounds import Shapes, empty_shapes, farthest_corners, join_upwards, light_shapes
 from .scene import Float64, Int32
 
 Int64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 ROOT = -1
-"""Parent of a cluster that has none."""
+"""Parent of a cluster that has none, and of a light that is not in the tree."""
 _SMALLEST_SHARE = 0.5
-"""Quantile of the lights' radii that the finest cells fit: smaller lights are met together."""
-_MAX_LEVELS = 40
+"""Quantile of the lights' radii that is the edge of the finest cells: smaller lights are met together."""
+_MAX_LEVELS = 21
+"""Three coordinates of so many bits fit in one integer."""
 
 
 @dataclass(frozen=True)
 class LightTree:
-    """Clusters in order of level, finest first.
+    """Clusters in order of depth, deepest first, roots last; those of a depth in order of their parents.
 
-    light_parent: (n,) int32, the cluster that each light is in. parent: (c,) int32, of each cluster, or ROOT. level:
-    (c,) int32, from 1. centroid: (c, 3) float64, m, of the lights' area. radius: (c,) float64, m, farthest corner of a
-    light from the centroid. tag_ids: (c,) int32.
+    light_parent: (n,) int32, the cluster that each light is in, or ROOT. parent: (c,) int32, of each cluster, or ROOT.
+    depth: (c,) int32, how many clusters a cluster is in. level: (c,) int32, from 1: its cell's edges are 2^level
+    cell_size, m, and start at cell_origin. tag_ids: (c,) int32. light_order: (m,) int32, the lights in order of their
+    clusters; light_offsets: (c + 1,) int32, those of cluster i are light_order[light_offsets[i]:light_offsets[i + 1]].
+    child_offsets: (c + 1,) int32, the clusters in cluster i are child_offsets[i] to child_offsets[i + 1] - 1.
+    shapes: where the lights of each cluster lie and which way they face.
     """
 
     light_parent: Int32
     parent: Int32
+    depth: Int32
     level: Int32
-    centroid: Float64
-    radius: Float64
     tag_ids: Int32
+    light_order: Int32
+    light_offsets: Int32
+    child_offsets: Int32
+    cell_origin: Float64
+    cell_size: float
+    shapes: Shapes
 
     def __len__(self) -> int:
         return len(self.parent)
 
     @property
+    def centroid(self) -> Float64:
+        """(c, 3) m, of the lights' area."""
+        return self.shapes.centroid
+
+    @property
+    def radius(self) -> Float64:
+        """(c,) m, farthest corner of a light from the centroid."""
+        return self.shapes.radius
+
+    @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return sum(array.nbytes for array in vars(self).values())
+        own = sum(array.nbytes for array in vars(self).values() if isinstance(array, np.ndarray))
+        return own + sum(array.nbytes for array in vars(self.shapes).values())
 
-    def levels(self) -> list[npt.NDArray[np.intp]]:
-        """Clusters of each level, finest first."""
-        return [np.flatnonzero(self.level == level) for level in np.unique(self.level)]
+    @property
+    def roots(self) -> npt.NDArray[np.intp]:
+        """Clusters without a parent."""
+        return np.flatnonzero(self.parent == ROOT)
 
-    def sums(self, of_lights: npt.NDArray[np.floating]) -> Float64:
-        """(c, ...) float64 sum over the lights of each cluster; of_lights: (n, ...)."""
-        total = np.zeros((len(self), *of_lights.shape[1:]))
-        np.add.at(total, self.light_parent, of_lights)
-        for clusters in self.levels():
-            inner = clusters[self.parent[clusters] != ROOT]
-            np.add.at(total, self.parent[inner], total[inner])
+    @property
+    def occupancy(self) -> list[tuple[int, int, int]]:
+        """(level, lights directly in clusters of that level, clusters), finest first."""
+        lights = np.bincount(self.level, np.diff(self.light_offsets))
+        clusters = np.bincount(self.level)
+        return [(int(level), int(lights[level]), int(clusters[level])) for level in np.flatnonzero(clusters)]
+
+    def depths(self) -> list[slice]:
+        """The clusters of each depth, deepest first."""
+        edges = np.flatnonzero(np.diff(self.depth, prepend=-1, append=-1))
+        return [slice(int(start), int(end)) for start, end in itertools.pairwise(edges)]
+
+    def sums(self, of_lights: Float64) -> Float64:
+        """(k, c) sums over the lights of each cluster; of_lights: (k, n)."""
+        inside = self.light_parent != ROOT
+        owner = self.light_parent[inside].astype(np.intp)
+        total = np.zeros((len(of_lights), len(self)))
+        for row, values in zip(total, of_lights, strict=True):
+            row += np.bincount(owner, values[inside], len(self))
+        for part in self.depths():
+            owner = self.parent[part].astype(np.intp)
+            if len(owner) and owner[0] != ROOT:
+                low, high = owner[0], owner[-1] + 1
+                for row in total:
+                    row[low:high] += np.bincount(owner - low, row[part], high - low)
         return total
 
 
-def build_light_tree(light_mesh: VirtualLightMesh) -> LightTree:
-    """The tree of a valid light mesh; of one without lights, no clusters."""
-    if len(light_mesh) == 0:
-        empty = np.zeros(0, np.int32)
-        return LightTree(empty, empty, empty, np.zeros((0, 3)), np.zeros(0), empty)
-    corners = light_mesh.corners
-    centroids = corners.mean(axis=1)
-    radii = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
-    cell = max(float(np.quantile(radii, _SMALLEST_SHARE)), float(np.finfo(float).tiny))
+def build_light_tree(light_mesh: VirtualLightMesh, chosen: Bools | None = None) -> LightTree:
+    """The tree of a valid light mesh, or of its lights `chosen` (n,) alone; of no lights, no clusters."""
+    rows = np.arange(len(light_mesh)) if chosen is None else np.flatnonzero(chosen)
+    light_parent = np.full(len(light_mesh), ROOT, np.int32)
+    if len(rows) == 0:
+        none, offsets = np.zeros(0, np.int32), np.zeros(1, np.int32)
+        return LightTree(light_parent, none, none, none, none, none, offsets, offsets, np.zeros(3), 1.0, empty_shapes())
+    lights = light_shapes(light_mesh.corners[rows])
+    grid = _grid(lights.centroid, lights.radius)
+    facing, tags = _facing(lights.axis), light_mesh.tag_ids[rows]
+    order = np.lexsort((grid.codes, facing, tags))
+    links = _group(grid.codes[order], np.stack([facing, tags])[:, order], grid.entry[order], grid.levels)
+    links = _by_depth(links)
+    light_parent[rows[order]] = links.light_parent
+    by_cluster = np.argsort(links.light_parent, kind="stable")
+    every = np.arange(len(links.parent) + 1)
+    tree = LightTree(
+        light_parent=light_parent,
+        parent=links.parent,
+        depth=links.depth,
+        level=links.level,
+        tag_ids=tags[order][links.first_light].astype(np.int32),
+        light_order=rows[order[by_cluster]].astype(np.int32),
+        light_offsets=np.searchsorted(links.light_parent[by_cluster], every).astype(np.int32),
+        child_offsets=np.searchsorted(links.parent[links.parent != ROOT], every).astype(np.int32),
+        cell_origin=grid.origin,
+        cell_size=grid.cell,
+        shapes=empty_shapes(),
+    )
+    members = lights.take(order[by_cluster])
+    shapes = join_upwards(members, tree.light_offsets, tree.child_offsets, tree.depths())
+    radius = farthest_corners(light_mesh.corners, light_parent, links.parent, shapes.centroid)
+    return replace(tree, shapes=replace(shapes, radius=radius))
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Finest cells of lights as Morton codes, the levels at which they enter, and how many levels there are."""
+
+    origin: Float64
+    cell: float
+    codes: Int64
+    entry: Int64
+    levels: int
+
+
+def _grid(centroids: Float64, radii: Float64) -> _Grid:
     low = centroids.min(axis=0)
     extent = float(np.ptp(centroids, axis=0).max())
-    top = min(math.ceil(math.log2(max(extent / cell, 1.0))) + 1, _MAX_LEVELS)
-    entry = np.clip(np.ceil(np.log2(np.maximum(radii, cell) / cell)), 0, top - 1).astype(np.intp)
-    keys = np.column_stack([_facing(light_mesh.area_vectors), light_mesh.tag_ids])
-    cells = np.floor((centroids - low) / cell).astype(np.int64)
-    links = _group(cells, keys, entry, top)
-    return _with_shapes(links, light_mesh, centroids)
+    least = max(extent * 2.0 ** (1 - _MAX_LEVELS), float(np.finfo(float).tiny))
+    cell = max(float(np.quantile(radii, _SMALLEST_SHARE)), least)
+    levels = min(math.ceil(math.log2(max(extent / cell, 1.0))) + 1, _MAX_LEVELS)
+    # Cells of the level above the lights' own are as large as the lights' radii.
+    entry = np.clip(np.ceil(np.log2(np.maximum(radii, 2.0 * cell) / cell)) - 1, 0, levels - 1).astype(np.int64)
+    cells = np.minimum(np.floor((centroids - low) / cell), 2**_MAX_LEVELS - 1).astype(np.int64)
+    return _Grid(low, cell, _spread_bits(cells) @ np.array([1, 2, 4]), entry, levels)
+
+
+def _spread_bits(values: Int64) -> Int64:
+    """Two zeros between the bits of integers of up to 21 bits."""
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        values = (values | values << shift) & mask
+    return values
+
+
+def _facing(normals: Float64) -> Int64:
+    """Which of six ways a light faces: its largest axis and that axis's sign."""
+    axis = np.abs(normals).argmax(axis=1)
+    return 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] < 0.0)
 
 
 @dataclass(frozen=True)
 class _Links:
+    """first_light: (c,) any one light of each cluster. Others as in LightTree."""
+
     light_parent: Int32
     parent: Int32
+    depth: Int32
     level: Int32
-    tag_ids: Int32
+    first_light: npt.NDArray[np.intp]
 
 
-def _facing(area_vectors: Float64) -> Int64:
-    """Which of six ways a light faces: its largest axis and that axis's sign."""
-    axis = np.abs(area_vectors).argmax(axis=1)
-    return 2 * axis + (np.take_along_axis(area_vectors, axis[:, None], axis=1)[:, 0] < 0.0)
+def _group(codes: Int64, keys: Int64, entry: Int64, levels: int) -> _Links:
+    """Clusters of all levels, coarser ones later, of lights in order of keys and codes.
+
+    A cell becomes a cluster where it holds at least two lights or clusters; at last whatever is left.
+    """
+    count = len(codes)
+    group = np.append(0, (np.diff(keys, axis=1) != 0).any(axis=0)).cumsum()
+    # What each light is part of so far: itself (its row), or a cluster (count + its number).
+    item = np.arange(count)
+    owner = np.full(2 * count, ROOT, np.int32)
+    firsts, found_levels = [], []
+    total = 0
+    for level in range(1, levels + 1):
+        inside = np.flatnonzero(entry < level)
+        new_cell = _changes(codes[inside] >> 3 * level) | _changes(group[inside])
+        new_item = new_cell | _changes(item[inside])
+        cell = new_cell.cumsum() - 1
+        members = np.bincount(cell[new_item], minlength=1)
+        kept = members > 1
+        if level == levels:
+            kept |= item[inside[new_cell]] < count
+        number = total + kept.cumsum() - 1
+        grouped = kept[cell]
+        owner[item[inside[grouped]]] = number[cell[grouped]]
+        firsts.append(inside[new_cell][kept])
+        item[inside[grouped]] = count + number[cell[grouped]]
+        found_levels.append(np.full(len(firsts[-1]), level, np.int32))
+        total += len(firsts[-1])
+    parent = owner[count : count + total]
+    level_of = np.concatenate(found_levels)
+    depth = np.zeros(total, np.int32)
+    for coarse in range(1, levels)[::-1]:
+        inner = np.flatnonzero((level_of == coarse) & (parent != ROOT))
+        depth[inner] = depth[parent[inner]] + 1
+    return _Links(owner[:count], parent, depth, level_of, np.concatenate(firsts))
 
 
-def _group(cells: Int64, keys: Int64, entry: npt.NDArray[np.intp], top: int) -> _Links:
-    """Clusters of all levels: at each, the lights that enter one level finer and the clusters of that level."""
-    light_parent = np.full(len(cells), ROOT, np.int32)
-    parents, levels, tags = [], [], []
-    below = np.zeros((0, cells.shape[1] + keys.shape[1]), np.int64)
-    count = 0
-    for level in range(1, top + 1):
-        own = np.flatnonzero(entry == level - 1)
-        members = np.column_stack([cells[own] >> level, keys[own]])
-        coarser = np.column_stack([below[:, :3] >> 1, below[:, 3:]])
-        unique, inverse = np.unique(np.concatenate([coarser, members]), axis=0, return_inverse=True)
-        inverse = inverse.reshape(-1).astype(np.int32) + count
-        parents.append(inverse[: len(below)])
-        light_parent[own] = inverse[len(below) :]
-        levels.append(np.full(len(unique), level, np.int32))
-        tags.append(unique[:, 4].astype(np.int32))
-        below, count = unique, count + len(unique)
-    parents.append(np.full(len(below), ROOT, np.int32))
-    return _Links(light_parent, np.concatenate(parents), np.concatenate(levels), np.concatenate(tags))
+def _changes(values: npt.NDArray[np.integer]) -> Bools:
+    """Where a run of equal values begins."""
+    return np.append(True, np.diff(values) != 0)[: len(values)]
 
 
-def _with_shapes(links: _Links, light_mesh: VirtualLightMesh, centroids: Float64) -> LightTree:
-    count = len(links.parent)
-    blank = LightTree(
-        links.light_parent, links.parent, links.level, np.zeros((count, 3)), np.zeros(count), links.tag_ids
+def _by_depth(links: _Links) -> _Links:
+    """The same in the order of LightTree."""
+    place = np.full(len(links.parent) + 1, 0, np.int32)
+    order = np.zeros(0, np.intp)
+    for depth in range(int(links.depth.max()) + 1):
+        own = np.flatnonzero(links.depth == depth)
+        own = own[np.argsort(place[links.parent[own]], kind="stable")]
+        place[own] = np.arange(len(own))
+        order = np.concatenate([own, order])
+    place[order] = np.arange(len(order))
+    place[ROOT] = ROOT
+    return _Links(
+        place[links.light_parent],
+        place[links.parent[order]],
+        links.depth[order],
+        links.level[order],
+        links.first_light[order],
     )
-    # Lights without area still lie somewhere.
-    weights = light_mesh.areas + np.finfo(float).tiny
-    totals = blank.sums(np.column_stack([weights, weights[:, None] * centroids]))
-    centroid = totals[:, 1:] / totals[:, :1]
-    radius = np.zeros(count)
-    corners, cluster = light_mesh.corners, links.light_parent.copy()
-    lights = np.arange(len(cluster))
-    while len(lights):
-        reach = np.linalg.norm(corners[lights] - centroid[cluster, None], axis=2).max(axis=1)
-        np.maximum.at(radius, cluster, reach)
-        cluster = links.parent[cluster]
-        lights, cluster = lights[cluster != ROOT], cluster[cluster != ROOT]
-    return LightTree(links.light_parent, links.parent, links.level, centroid, radius, links.tag_ids)
