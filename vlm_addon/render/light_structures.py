@@ -95,7 +95,7 @@ class LightStructures:
                 if self._on_device:
                     return _grid_on_device(context, shaders, light_mesh, bounds, settings, chosen, progress)
                 grid = RangeGrid.bake(light_mesh, bounds, settings, progress, chosen)
-                return _gpu_grid(context, grid.frame, grid.half_balls, upload(context, grid.lists))
+                return gpu_grid(context, grid.frame, grid.half_balls, upload(context, grid.lists))
 
             result.append(self.kept(f"{kind}_grid", key, build))
         return result
@@ -143,10 +143,11 @@ def _grid_on_device(
     if settings.max_lights:
         grid = RangeGrid.from_lists(settings, frame, shapes, lists.read(), progress)
         lists = upload(context, grid.lists)
-    return _gpu_grid(context, frame, shapes.half_balls, lists)
+    return gpu_grid(context, frame, shapes.half_balls, lists)
 
 
-def _gpu_grid(context: moderngl.Context, frame: GridFrame, half_balls: HalfBalls, lists: GpuBlockLists) -> GpuRangeGrid:
+def gpu_grid(context: moderngl.Context, frame: GridFrame, half_balls: HalfBalls, lists: GpuBlockLists) -> GpuRangeGrid:
+    """A grid whose lists are on the device already."""
     offsets = np.frombuffer(lists.offsets.read(), np.uint32).astype(np.int64)
     records = context.buffer(half_ball_records(half_balls).tobytes())
     return GpuRangeGrid(frame, lists, records, int(np.diff(offsets).max(initial=0)))

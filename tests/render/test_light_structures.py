@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames whose lights come from structures that are kept: what is built when, and that nothing pops, leaks or seams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.render.rooms import box_room, camera_at, lights_from_triangles, quad
+from vlm_addon.core.light_mesh import VirtualLightMesh, join
+from vlm_addon.core.scene import DIFFUSE, POINT, Float32, Float64, Light, Material, SceneSnapshot
+from vlm_addon.render.device import Device
+from vlm_addon.render.frame_types import Frame, RenderSettings
+from vlm_addon.render.light_structures import LightStructures
+from vlm_addon.render.techniques.vlm import FEW_LIGHTS
+
+TREES = ("static_tree", "dynamic_tree", "static_clusters", "dynamic_clusters")
+PAGE = 4096
+
+
+def split(corners: Float64, times: int) -> Float64:
+    """Each triangle as four, `times` over."""
+    for _ in range(times):
+        a, b, c = np.moveaxis(corners, 1, 0)
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return corners
+
+
+def wall_lights(snapshot: SceneSnapshot, times: int = 4) -> VirtualLightMesh:
+    """The walls of the box room cut into lights, a little behind the walls; they move nowhere."""
+    walls = [mesh for mesh in snapshot.meshes if mesh.name in ("floor", "ceiling", "back", "left", "right")]
+    corners = split(np.concatenate([mesh.positions[mesh.triangles] for mesh in walls]), times)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lights = lights_from_triangles(corners - 1e-3 * normals[:, None], emission=0.0, colour=0.6)
+    samples = replace(lights.samples, positions=lights.samples.positions + 2e-3 * normals)
+    return replace(lights, samples=samples)
+
+
+def turning_lights(turn: float) -> VirtualLightMesh:
+    """A glowing quad of 128 lights in the middle of the room, turned about the vertical by `turn` rad."""
+    along = np.array([np.cos(turn), np.sin(turn), 0.0])
+    square = quad(np.array([1.0, 1.0, 0.5]) - 0.25 * along, 0.5 * along, (0.0, 0.0, 0.5))
+    lights = lights_from_triangles(split(square.positions[square.triangles], 3), emission=(2.0, 1.0, 0.5))
+    return replace(lights, dynamic=np.ones(len(lights), bool))
+
+
+def settings(**values: object) -> RenderSettings:
+    return RenderSettings(
+        40, 30, technique_settings=values, samples=1, shadow_resolution=64, shadow_samples=1, buffers=True
+    )
+
+
+def built(frame: Frame) -> dict[str, float]:
+    """The counters of what was built, by kind."""
+    return {name[: -len("_built")]: n for name, n in frame.counters.items() if name.endswith("_built")}
+
+
+def indirect(frame: Frame) -> Float32:
+    """(h, w) irradiance, sum over the channels."""
+    return frame.images["irradiance"][..., :3].sum(axis=2)
+
+
+def scene_with_lamp_at(x: float) -> SceneSnapshot:
+    lamp = Light("lamp", POINT, (40.0, 40.0, 40.0), (x, 1.0, 1.5))
+    return replace(box_room(), lights=(lamp,))
+
+
+@pytest.fixture
+def own_device() -> Device:
+    """A device that has kept nothing yet."""
+    with Device() as opened:
+        yield opened
+
+
+def test_a_second_frame_builds_nothing(own_device: Device) -> None:
+    room = box_room()
+    lights = join([wall_lights(room), turning_lights(0.0)])
+    first = own_device.render(room, lights, settings())
+    assert built(first) == dict.fromkeys(TREES, 1)
+    second = own_device.render(room, lights, settings())
+    assert built(second) == dict.fromkeys(TREES, 0)
+    assert (first.images["combined"] == second.images["combined"]).all()
+
+
+def test_a_moved_camera_builds_no_tree(own_device: Device) -> None:
+    room = box_room()
+    lights = wall_lights(room)
+    own_device.render(room, lights, settings())
+    moved = replace(room, camera=camera_at((0.3, -2.0, 1.7), (1.2, 1.0, 0.8), lens=30.0))
+    found = own_device.render(moved, lights, settings())
+    assert built(found)["static_tree"] == 0
+    exact = own_device.render(moved, lights, settings(lights="all"))
+    assert indirect(found) == pytest.approx(indirect(exact), rel=0.06, abs=0.01 * indirect(exact).mean())
+
+
+def test_a_moved_lamp_changes_only_what_clusters_send_out(own_device: Device) -> None:
+    lights = wall_lights(box_room())
+    own_device.render(scene_with_lamp_at(0.5), lights, settings())
+    found = built(own_device.render(scene_with_lamp_at(0.6), lights, settings()))
+    assert found == {"static_tree": 0, "dynamic_tree": 0, "static_clusters": 1, "dynamic_clusters": 0}
+
+
+def test_a_turned_mesh_builds_only_the_tree_of_what_moves(own_device: Device) -> None:
+    room = box_room()
+    own_device.render(room, join([wall_lights(room), turning_lights(0.0)]), settings())
+    found = built(own_device.render(room, join([wall_lights(room), turning_lights(0.1)]), settings()))
+    assert found["static_tree"] == 0
+    assert found["dynamic_tree"] == 1
+
+
+def test_a_grid_of_static_lights_is_kept_when_a_mesh_moves(own_device: Device) -> None:
+    room = box_room()
+
+    def frame(height: float) -> Frame:
+        moving = quad((0.5, 0.5, height), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), name="moving")
+        scene = replace(room, meshes=(*room.meshes, replace(moving, dynamic=True)))
+        lights = turning_lights(height)
+        return own_device.render(scene, join([wall_lights(room), lights]), settings(lights="range", grid=6))
+
+    assert built(frame(0.3)) == {"static_grid": 1, "dynamic_grid": 1}
+    # Beyond the grid of what stands still.
+    assert built(frame(2.5)) == {"static_grid": 0, "dynamic_grid": 1}
+    assert built(frame(2.5)) == {"static_grid": 0, "dynamic_grid": 0}
+
+
+def test_other_settings_build_another_grid(own_device: Device) -> None:
+    room = box_room()
+    lights = wall_lights(room, 2)
+    for values in ({"grid": 5}, {"grid": 6}, {"grid": 6, "range": 2.0}, {"grid": 6, "range": 2.0, "max_lights": 3}):
+        assert built(own_device.render(room, lights, settings(lights="range", **values)))["static_grid"] == 1
+
+
+def test_few_lights_are_summed_and_the_frame_says_why(device: Device) -> None:
+    room = box_room()
+    few, many = wall_lights(room, 1), wall_lights(room)
+    assert len(few) <= FEW_LIGHTS < len(many)
+    frame = device.render(room, few, settings())
+    assert frame.counters["evaluated_per_pixel"] == len(few)
+    assert any(str(len(few)) in reason for reason in frame.reasons)
+    exact = device.render(room, few, settings(lights="all"))
+    assert (frame.images["combined"] == exact.images["combined"]).all()
+    assert not exact.reasons
+    assert not device.render(room, many, settings()).reasons
+
+
+def test_only_the_latest_of_each_kind_is_kept() -> None:
+    structures = LightStructures(on_device=False)
+    made: list[int] = []
+
+    def make(value: int) -> Callable[[], int]:
+        return lambda: made.append(value) or value
+
+    assert [structures.kept("a", key, make(int(key))) for key in "1122"] == [1, 1, 2, 2]
+    assert structures.kept("b", "1", make(3)) == 3
+    assert structures.kept("a", "1", make(4)) == 4
+    assert made == [1, 2, 3, 4]
+    assert structures.built == {"a": 3, "b": 1}
+
+
+def lamp_frames(count: int) -> list[tuple[SceneSnapshot, VirtualLightMesh]]:
+    lights = wall_lights(box_room())
+    return [(scene_with_lamp_at(0.5 + 0.6 * i / count), lights) for i in range(count)]
+
+
+def turning_frames(count: int) -> list[tuple[SceneSnapshot, VirtualLightMesh]]:
+    room = box_room()
+    still = wall_lights(room)
+    return [(room, join([still, turning_lights(0.5 * np.pi * i / count)])) for i in range(count)]
+
+
+def check_motion(device: Device, frames: list[tuple[SceneSnapshot, VirtualLightMesh]], tolerance: float) -> None:
+    """Over frames: pictures change as the full sum's do, nothing static is built, memory does not grow."""
+    before = None
+    memory: list[int] = []
+    for scene, lights in frames:
+        frame = device.render(scene, lights, settings(tolerance=tolerance))
+        exact = indirect(device.render(scene, lights, settings(lights="all")))
+        error = (indirect(frame) - exact) / np.maximum(exact, 0.1 * exact.mean())
+        if before is not None:
+            assert built(frame)["static_tree"] == 0
+            # What the error changes by from frame to frame is what pops.
+            assert np.abs(error - before).max() <= tolerance
+        before = error
+        memory.append(resident_bytes())
+    half = len(memory) // 2
+    assert max(memory[half:]) <= max(memory[:half]) + 2_000_000
+
+
+def resident_bytes() -> int:
+    """Of this process; 0 where the system does not say."""
+    try:
+        with open("/proc/self/statm") as file:
+            return PAGE * int(file.read().split()[1])
+    except OSError:
+        return 0
+
+
+@pytest.mark.parametrize("frames", [lamp_frames, turning_frames], ids=["lamp", "turning mesh"])
+def test_nothing_pops_while_something_moves(own_device: Device, frames: Callable) -> None:
+    check_motion(own_device, frames(30), 0.02)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("frames", [lamp_frames, turning_frames], ids=["lamp", "turning mesh"])
+def test_nothing_pops_over_a_thousand_frames(own_device: Device, frames: Callable) -> None:
+    check_motion(own_device, frames(1000), 0.02)
+
+
+def floor_from_above(width: int) -> SceneSnapshot:
+    """A strip of floor seen from above, one row of pixels of a flat surface."""
+    strip = quad((0.0, 0.9, 0.0), (2.0, 0.0, 0.0), (0.0, 0.2, 0.0), name="floor")
+    camera = camera_at((1.0, 1.0, 10.0), (1.0, 1.0, 0.0), kind="ORTHOGRAPHIC", ortho_scale=1.9)
+    return SceneSnapshot("strip", (strip,), (Material("white", DIFFUSE, (0.8, 0.8, 0.8)),), camera=camera)
+
+
+@pytest.mark.parametrize(("values", "seams"), [({}, False), ({"tolerance": 0.1}, False), ({"lights": "range"}, True)])
+def test_no_seam_along_a_flat_floor(device: Device, values: dict[str, object], seams: bool) -> None:
+    """Greatest step between neighbouring pixels against the greatest step of the full sum; tiles and cells in between.
+
+    Range mode shows its cells, so the test can fail.
+    """
+    width = 800
+    scene, lights = floor_from_above(width), wall_lights(box_room())
+    glowing = replace(lights, emission=np.full((len(lights), 3), 1.0, np.float32))
+
+    def steps(**chosen: object) -> Float64:
+        chosen_settings = replace(settings(**chosen), width=width, height=2)
+        row = indirect(device.render(scene, glowing, chosen_settings))[0].astype(float)
+        assert row.max() > 0.0
+        return np.abs(np.diff(row))
+
+    greatest = steps(grid=8, **values).max() / steps(lights="all").max()
+    assert (greatest > 3.0) if seams else (greatest < 1.5)
