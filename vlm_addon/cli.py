@@ -17,7 +17,7 @@ from .core.errors import VlmError
 EXIT_DONE, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_FINDINGS = 0, 1, 2, 3
 
 EXAMPLES = """examples:
-  vlm bake hall.blend --triangles 2000 --save hall_vlm.blend --json hall.json
+  vlm bake hall.blend --triangles 2000 --tolerance 0.02 --save hall_vlm.blend --json hall.json
   vlm render hall_vlm.blend --technique vlm --size 960x540 --out hall.png
   vlm check hall_vlm.blend
   vlm techniques
@@ -73,7 +73,17 @@ def _add_bake(commands: argparse._SubParsersAction[_Parser]) -> None:
     command = _command(commands, "bake", text, "vlm bake hall.blend --triangles 2000 --save hall_vlm.blend")
     _scene_options(command)
     command.add_argument("--triangles", type=int, metavar="N", help="virtual lights to make; replaces generated ones")
-    command.add_argument("--save", type=Path, metavar="OUT.blend", help="the scene with its light mesh")
+    command.add_argument("--grid", type=int, metavar="N", help="cells along each side of the light grid, with --range")
+    mode = command.add_mutually_exclusive_group()
+    tolerance_help = (
+        "most error of the light grid, as a share of the irradiance; the scene's own setting without (0.02)"
+    )
+    mode.add_argument("--tolerance", type=float, metavar="E", help=tolerance_help)
+    range_help = "a light grid that drops lights farther away than so many of their radii, instead of a tolerance"
+    mode.add_argument("--range", type=float, metavar="R", help=range_help)
+    command.add_argument("--max-lights", type=int, metavar="K", help="most lights in a cell, with --range")
+    command.add_argument("--light-grid", type=Path, metavar="OUT.vlmgrid", help="the light grid as a file")
+    command.add_argument("--save", type=Path, metavar="OUT.blend", help="the scene with its light mesh and settings")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="what was made, measured and found")
     command.set_defaults(run=_bake)
 

@@ -160,6 +160,14 @@ def main():
         }
 
     @step
+    def light_grid():
+        group = bpy.context.scene.vlm.vlm_settings
+        group.lights, group.range = "range", 0.0
+        dropped = picture("dropped", "VLM_ENGINE")
+        group.lights = "tolerance"
+        return float(dropped[..., :3].mean())
+
+    @step
     def passes():
         settings = bpy.context.scene.render.image_settings
         if hasattr(settings, "media_type"):

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender.image_io import read_image
+from vlm_addon.blender.light_grid_options import scene_grid_settings
 from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.cli import main
+from vlm_addon.core.light_grid_file import load_light_grid
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -127,6 +129,43 @@ def test_check_of_a_sound_light_mesh_is_silent_and_of_none_is_a_finding(lit_room
     assert len(json.loads(report.read_text())["findings"]) == 1
 
 
+def test_bake_keeps_the_light_grid_it_was_asked_for_in_the_scene_and_in_a_file(lit_room, tmp_path, capsys):
+    baked, grid, report = tmp_path / "baked.blend", tmp_path / "room.vlmgrid", tmp_path / "report.json"
+    options = ["--range", 8, "--grid", 10, "--max-lights", 5]
+    run(capsys, "bake", lit_room, "--triangles", 12, *options, "--save", baked, "--light-grid", grid, "--json", report)
+    written = json.loads(report.read_text())["light_grid"]
+    assert written["settings"] == {"mode": "range", "tolerance": 0.02, "grid": 10, "range": 8.0, "max_lights": 5}
+    open_scene(baked)
+    light_mesh = extract().light_mesh
+    loaded = load_light_grid(grid, light_mesh)
+    assert loaded.settings == scene_grid_settings(bpy.context.scene)
+    assert loaded.nbytes == written["bytes"]
+
+
+def test_bake_says_how_far_off_the_light_grid_is(lit_room, tmp_path, capsys):
+    report = tmp_path / "report.json"
+    assert run(capsys, "bake", lit_room, "--triangles", 12, "--tolerance", 0.05, "--json", report)[0] == 0
+    errors = json.loads(report.read_text())["light_grid"]["point_error"]
+    assert 0.0 <= errors["median"] <= errors["95 %"] <= 0.05
+
+
+def test_a_light_grid_whose_cells_overflow_is_a_finding(lit_room, tmp_path, capsys):
+    baked, report = tmp_path / "baked.blend", tmp_path / "report.json"
+    run(capsys, "bake", lit_room, "--triangles", 12, "--range", 8, "--max-lights", 1, "--save", baked)
+    assert run(capsys, "check", baked, "--json", report)[0] == 3
+    (finding,) = json.loads(report.read_text())["findings"]
+    assert "lights are left out" in finding["problem"]
+
+
+def test_render_takes_the_settings_that_the_scene_keeps(lit_room, tmp_path, capsys):
+    baked, report = tmp_path / "baked.blend", tmp_path / "report.json"
+    run(capsys, "bake", lit_room, "--triangles", 12, "--tolerance", 0.1, "--save", baked)
+    picture = ["--technique", "vlm", "--size", "16x16", "--samples", 1, "--out", tmp_path / "o.png", "--json", report]
+    for options, tolerance in (([], 0.1), (["--set", "tolerance=0.3"], 0.3)):
+        assert run(capsys, "render", baked, *picture, *options)[0] == 0
+        assert json.loads(report.read_text())["settings"]["technique_settings"]["tolerance"] == tolerance
+
+
 def test_techniques_lists_each_with_its_settings(tmp_path, capsys):
     report = tmp_path / "techniques.json"
     assert run(capsys, "techniques", "--json", report)[0] == 0
@@ -139,6 +178,13 @@ BAD_OPTIONS = {
     "zero triangles": (["bake", "{scene}", "--triangles", "0", "--save", "{folder}/o.blend"], "at least 1"),
     "negative triangles": (["bake", "{scene}", "--triangles", "-5", "--save", "{folder}/o.blend"], "at least 1"),
     "nothing to write": (["bake", "{scene}"], "name --save"),
+    "tolerance out of range": (["bake", "{scene}", "--tolerance", "2", "--save", "{folder}/o.blend"], "out of range"),
+    "tolerance not a number": (["bake", "{scene}", "--tolerance", "nan", "--save", "{folder}/o.blend"], "out of range"),
+    "cells without a range": (["bake", "{scene}", "--grid", "20", "--save", "{folder}/o.blend"], "give --range too"),
+    "negative range": (["bake", "{scene}", "--range", "-1", "--save", "{folder}/o.blend"], "out of range"),
+    "too many cells": (
+        ["bake", "{scene}", "--range", "4", "--grid", "5000", "--save", "{folder}/o.blend"], "out of range"),
+    "grid onto the scene": (["bake", "{scene}", "--light-grid", "{scene}"], "the source is never changed"),
     "no folder": (["bake", "{scene}", "--save", "{folder}/no/o.blend"], "its folder does not exist"),
     "check onto the source": (["check", "{scene}", "--json", "{scene}"], "the source is never changed"),
     "one name for two": (
@@ -176,6 +222,14 @@ def test_bad_options_are_one_line_and_exit_2(name, lit_room, tmp_path, capsys):
     assert code == 2
     assert len(errors) == 1
     assert says in errors[0]
+    assert others(tmp_path, lit_room) == []
+
+
+def test_a_light_grid_has_a_tolerance_or_a_range(lit_room, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["bake", str(lit_room), "--tolerance", "0.1", "--range", "4", "--save", str(tmp_path / "o.blend")])
+    assert ended.value.code == 2
+    assert "--range: not allowed with argument --tolerance" in capsys.readouterr().err
     assert others(tmp_path, lit_room) == []
 
 

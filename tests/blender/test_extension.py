@@ -127,6 +127,10 @@ def test_bounce_light_in_a_red_room_is_red(told):
     assert bounce[0] > 2 * bounce[1]
 
 
+def test_the_scenes_light_grid_is_what_f12_renders_with(told):
+    assert told["light_grid"] == pytest.approx(sum(told["f12"]["direct"]) / 3)
+
+
 def test_direct_and_indirect_light_are_passes_of_their_own(told):
     assert told["passes"] == ["Combined", "Direct Light", "Indirect Light"]
 

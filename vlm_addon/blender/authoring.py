@@ -11,14 +11,14 @@ import bpy
 
 from ..bake import Bake, bake
 from ..core.errors import InvalidInput, VlmError
-from ..core.light_mesh import empty_light_mesh
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..core.simplify import SimplifySettings
-from ..core.validate import check_light_mesh
+from ..light_grid_bake import check_lights
 from .availability import has_geometry, light_mesh_objects, rendered_objects
 from .engine import ENGINE_ID
 from .extract import ExtractOptions, extract_scene, require_camera, require_lights
+from .light_grid_options import scene_grid_settings
 from .light_mesh_io import Extraction, extract
 from .names import SOURCES_PROPERTY
 from .write_back import write_light_mesh
@@ -102,10 +102,11 @@ def _counted_twice(scene: Any, made: Made) -> list[Finding]:
 
 
 def check(context: Any) -> tuple[Finding, ...]:
-    """What is wrong with the light meshes of the scene, and what extraction had to approximate; also listed."""
+    """What is wrong with the light meshes and the light grid of the scene, and what extraction had to approximate; also
+    listed."""
     found = extract()
-    light_mesh = found.light_mesh if found.light_mesh is not None else empty_light_mesh()
-    findings = (*check_light_mesh(light_mesh, found.snapshot.meshes), *found.snapshot.findings)
+    settings = scene_grid_settings(context.scene)
+    findings = (*check_lights(found.snapshot, found.light_mesh, settings), *found.snapshot.findings)
     list_findings(context.scene, findings)
     return findings
 

@@ -14,12 +14,12 @@ import bpy
 
 from ..bake import Bake, bake
 from ..core.errors import InvalidInput
-from ..core.light_mesh import empty_light_mesh
+from ..core.light_grid_file import save_light_grid
 from ..core.progress import Progress
-from ..core.scene import Finding
+from ..core.scene import Finding, SceneSnapshot
 from ..core.settings import describe, from_mapping
 from ..core.simplify import SimplifySettings
-from ..core.validate import check_light_mesh
+from ..light_grid_bake import GridBake, bake_light_grid, check_lights
 from ..render.frame_types import Frame, RenderSettings, require_in_range
 from ..render.technique import technique_by_name, technique_list
 from ..terminal import TerminalProgress, table
@@ -27,8 +27,10 @@ from .authoring import NAME
 from .availability import light_mesh_objects
 from .extract import ExtractOptions, require_camera, require_lights, require_surfaces
 from .image_io import require_format, require_view, write_image
-from .light_mesh_io import Extraction, extract
+from .light_grid_options import keep_options, scene_grid_settings
+from .light_mesh_io import Extraction, extract, extract_light_mesh
 from .names import SOURCES_PROPERTY
+from .properties import ensure_scene_settings, technique_settings
 from .render_process import KEPT
 from .scene_file import OpenedScene, atomic_output, open_scene, require_writable, save_blend
 from .write_back import write_light_mesh
@@ -36,12 +38,13 @@ from .write_back import write_light_mesh
 
 def bake_command(arguments: Namespace) -> None:
     """`bake`: writes the scene with its light mesh and a report."""
-    outputs = [path for path in (arguments.save, arguments.json) if path is not None]
+    outputs = [path for path in (arguments.save, arguments.json, arguments.light_grid) if path is not None]
     if not outputs:
         raise InvalidInput("bake", "nothing would be written", "name --save OUT.blend, --json REPORT.json or both")
     settings = _simplify_settings(arguments.triangles)
     _require_apart(arguments.scene, outputs)
     opened, found = _open(arguments)
+    keep_options(bpy.context.scene, arguments)
     drawn = _drawn_by_hand()
     anew = not drawn and (found.light_mesh is None or settings is not None)
     _require_visible_light_meshes(found)
@@ -58,11 +61,31 @@ def bake_command(arguments: Namespace) -> None:
             Finding(f"scene {found.snapshot.name!r}", problem, "delete them from the scene to have one made"),
             *findings,
         )
+    grid = _grid(found.snapshot, arguments)
+    findings = (*findings, *(grid.findings if grid is not None else ()))
+    if grid is not None and arguments.light_grid is not None:
+        save_light_grid(grid.grid, arguments.light_grid)
     if arguments.save is not None:
         save_blend(arguments.save, opened)
     _print_findings(findings)
     print(_bake_summary(made))
-    write_json(arguments.json, _scene_report(opened) | made.report() | {"findings": [str(f) for f in findings]})
+    if grid is not None:
+        print(grid.summary())
+    about_grid = {"light_grid": grid.report() if grid is not None else None}
+    about_findings = {"findings": [str(finding) for finding in findings]}
+    write_json(arguments.json, _scene_report(opened) | made.report() | about_grid | about_findings)
+
+
+def _grid(snapshot: SceneSnapshot, arguments: Namespace) -> GridBake | None:
+    """The light grid that the scene asks for, of its lights as they are stored, judged; None where it asks for none."""
+    settings = scene_grid_settings(bpy.context.scene)
+    if settings is None:
+        if arguments.light_grid is not None:
+            problem = "the scene sums all lights, without a light grid"
+            raise InvalidInput("--light-grid", problem, "give --tolerance or --range, too")
+        return None
+    light_mesh = extract_light_mesh(snapshot, ExtractOptions(viewport_levels=arguments.viewport_levels))
+    return None if light_mesh is None else bake_light_grid(snapshot, light_mesh, settings, TerminalProgress())
 
 
 def _simplify_settings(triangles: int | None) -> SimplifySettings | None:
@@ -118,6 +141,9 @@ def render_command(arguments: Namespace) -> None:
     if arguments.buffers is not None:
         _make_folder(arguments.buffers)
     opened, found = _open(arguments)
+    kept = technique_settings(bpy.context.scene, technique.name)
+    chosen: Any = from_mapping(technique.settings, kept | settings, f"technique {technique.name!r}")
+    frame_settings = replace(frame_settings, technique_settings=asdict(chosen))
     require_camera(found.snapshot)
     require_surfaces(found.snapshot)
     require_lights(found.snapshot)
@@ -132,6 +158,8 @@ def render_command(arguments: Namespace) -> None:
             write_image(arguments.buffers / f"{name}.exr", image)
     write_image(arguments.out, frame.images["combined"], view=arguments.view)
     _print_findings((*frame.findings, *found.snapshot.findings))
+    for reason in frame.reasons:
+        print(f"pass: {reason}")
     print(_timing_table(frame))
     write_json(arguments.json, _scene_report(opened) | _frame_report(frame, frame_settings, found.snapshot.findings))
 
@@ -179,6 +207,7 @@ def _frame_report(frame: Frame, settings: RenderSettings, findings: tuple[Findin
         "timer": frame.timer,
         "milliseconds": [list(entry) for entry in frame.timings],
         "counters": frame.counters,
+        "reasons": list(frame.reasons),
         "findings": [str(finding) for finding in (*frame.findings, *findings)],
     }
 
@@ -190,15 +219,16 @@ def check_command(arguments: Namespace) -> int:
     """
     _require_apart(arguments.scene, [arguments.json] if arguments.json is not None else [])
     opened, found = _open(arguments)
-    light_mesh = found.light_mesh if found.light_mesh is not None else empty_light_mesh()
-    findings = check_light_mesh(light_mesh, found.snapshot.meshes)
+    settings = scene_grid_settings(bpy.context.scene)
+    findings = check_lights(found.snapshot, found.light_mesh, settings, TerminalProgress())
+    light_count = len(found.light_mesh) if found.light_mesh is not None else 0
     for finding in findings:
         print(f"finding: {finding}")
     for note in found.snapshot.findings:
         print(f"note: {note}")
-    print(f"{len(light_mesh)} virtual lights, {len(findings)} findings")
+    print(f"{light_count} virtual lights, {len(findings)} findings")
     report = {
-        "lights": len(light_mesh),
+        "lights": light_count,
         "findings": [asdict(finding) for finding in findings],
         "notes": [asdict(note) for note in found.snapshot.findings],
     }
@@ -231,6 +261,7 @@ def techniques_command(arguments: Namespace) -> None:
 
 
 def _open(arguments: Namespace) -> tuple[OpenedScene, Extraction]:
+    ensure_scene_settings()
     opened = open_scene(arguments.scene, arguments.frame, arguments.scene_name, arguments.view_layer, arguments.camera)
     return opened, extract(ExtractOptions(viewport_levels=arguments.viewport_levels))
 
