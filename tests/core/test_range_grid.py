@@ -71,6 +71,20 @@ def test_every_grid_size_and_range_on_one_light_mesh():
             assert np.array_equal(lists_as_table(grid), brute_force(grid))
 
 
+@pytest.mark.parametrize("cells", [30, 65, 103])
+def test_large_grids_and_their_last_blocks(cells):
+    """Random cells and those at the upper faces, where blocks hold less than 64."""
+    lights = random_lights(17, 60)
+    grid = RangeGrid.bake(lights, BOX, RangeSettings(cells, 3.0))
+    places = np.random.default_rng(cells).integers(0, cells, (300, 3))
+    places[::2, cells % 3] = cells - 1
+    chosen = places @ [1, cells, cells**2]
+    offsets, ids = grid.lists.cell_lists(chosen)
+    assert len(ids)
+    for row, cell in enumerate(chosen):
+        assert ids[offsets[row] : offsets[row + 1]].tolist() == np.flatnonzero(grid.reaching(int(cell))).tolist()
+
+
 def test_lists_ascend_and_are_the_same_every_time():
     grid, again = (RangeGrid.bake(random_lights(3, 300), BOX, RangeSettings(9, 3.0)) for _ in range(2))
     offsets, ids = grid.lists.cell_lists(np.arange(9**3))

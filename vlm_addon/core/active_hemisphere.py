@@ -52,7 +52,7 @@ class HalfBalls:
 
     def take(self, rows: npt.NDArray[Any] | slice) -> HalfBalls:
         """Those of `rows`, in that order."""
-        rows = np.arange(len(self))[rows]
+        rows = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
         return HalfBalls(
             centres=np.take(self.centres, rows, axis=1),
             normals=np.take(self.normals, rows, axis=1),

@@ -62,9 +62,9 @@ class BlockTests:
 
         Bit x + 4 y + 16 z stands for the block's cell x, y, z.
         """
-        rows = self._starts[:, members] + offsets
-        places = self._firsts[:, members] + offsets
-        radii_squared = self._half_balls.radii_squared[members]
+        rows = np.take(self._starts, members, axis=1) + offsets
+        places = np.take(self._firsts, members, axis=1) + offsets
+        radii_squared = np.take(self._half_balls.radii_squared, members)
         x, y, z = (np.take(bounds, rows[axis], axis=1) for axis, bounds in enumerate(self._bounds))
         bounds = (x + y) + z
         touched = (bounds[_LEAST_NEAR] <= radii_squared) & (bounds[_MOST_HEIGHT] >= 0.0)
@@ -74,16 +74,16 @@ class BlockTests:
         partly = touched & ~whole
         # Where all cells are within the ball the plane decides; where all nearest points are in front, the ball.
         at = np.flatnonzero(partly & inner)
-        masks[at] = packed(self._sums(HEIGHT, rows[:, at]) >= 0.0)
+        masks[at] = packed(self._sums(HEIGHT, np.take(rows, at, axis=1)) >= 0.0)
         at = np.flatnonzero(partly & front & ~inner)
-        masks[at] = packed(self._sums(NEAR, rows[:, at]) <= radii_squared[at])
+        masks[at] = packed(self._sums(NEAR, np.take(rows, at, axis=1)) <= radii_squared[at])
         at = np.flatnonzero(partly & ~front & ~inner)
-        masks[at] = packed(self._reached(members[at], rows[:, at], places[:, at]))
+        masks[at] = packed(self._reached(members[at], np.take(rows, at, axis=1), np.take(places, at, axis=1)))
         x_cells, y_cells, z_cells = (cells[places[axis]] for axis, cells in enumerate(self._cells))
         return masks & (x_cells * y_cells * z_cells)
 
     def _reached(self, members: Ints, rows: Ints, places: Ints) -> Bools:
-        radii_squared = self._half_balls.radii_squared[members]
+        radii_squared = np.take(self._half_balls.radii_squared, members)
         reached = self._sums(NEAR, rows) <= radii_squared
         reached &= self._sums(HEIGHT, rows) >= 0.0
         result = self._sums(NEAR_HEIGHT, rows) >= 0.0

@@ -49,6 +49,15 @@ class LitTree:
     tree: LightTree
     clusters: LightClusters
 
+    @classmethod
+    def made(cls, tree: LightTree, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float) -> LitTree:
+        """The tree under (n, 3) W/m² of all lights, with windows for `tolerance`."""
+        return cls(tree, light_clusters(tree, light_mesh, radiosity, tolerance))
+
+    def relit(self, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float) -> LitTree:
+        """The same tree under other light."""
+        return self.made(self.tree, light_mesh, radiosity, tolerance)
+
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
@@ -108,36 +117,38 @@ class LightGrid:
 
     def moved(self, light_mesh: VirtualLightMesh, progress: Progress = silent) -> LightGrid:
         """The grid of the lights as they are now; a structure of which nothing has changed is kept. As `bake`."""
-        made = []
         old = ((self.static, self.static_hash), (self.dynamic, self.dynamic_hash))
+        made: list[tuple[RangeGrid | LitTree | None, str]] = []
+        radiosity = nominal_radiosity(light_mesh)
         for (structure, old_hash), chosen in zip(old, (~light_mesh.dynamic, light_mesh.dynamic), strict=True):
             new_hash = lights_hash(light_mesh, chosen, self.settings.mode)
-            made.append((structure if new_hash == old_hash else self._built(light_mesh, chosen, progress), new_hash))
+            if new_hash != old_hash:
+                structure = self._built(light_mesh, chosen, radiosity, progress)
+            elif isinstance(structure, LitTree):
+                # What is allowed of a tree depends on all lights.
+                structure = structure.relit(light_mesh, radiosity, self.settings.tolerance)
+            made.append((structure, new_hash))
         (static, static_hash), (dynamic, dynamic_hash) = made
-        grid = LightGrid(self.settings, self.bounds, len(light_mesh), static, dynamic, static_hash, dynamic_hash)
-        return grid.relit(light_mesh, nominal_radiosity(light_mesh))
+        return LightGrid(self.settings, self.bounds, len(light_mesh), static, dynamic, static_hash, dynamic_hash)
 
-    def _built(self, light_mesh: VirtualLightMesh, chosen: Bools, progress: Progress) -> RangeGrid | LitTree | None:
+    def _built(
+        self, light_mesh: VirtualLightMesh, chosen: Bools, radiosity: Float64, progress: Progress
+    ) -> RangeGrid | LitTree | None:
         if not chosen.any():
             return None
         if self.settings.mode == RANGE:
             of_range = RangeSettings(self.settings.grid, self.settings.range, self.settings.max_lights)
             return RangeGrid.bake(light_mesh, (self.bounds[0], self.bounds[1]), of_range, progress, chosen)
         step(progress, 0.0, "light tree")
-        tree = build_light_tree(light_mesh, chosen)
-        dark = np.zeros((len(light_mesh), 3))
-        return LitTree(tree, light_clusters(tree, light_mesh, dark, self.settings.tolerance))
+        return LitTree.made(build_light_tree(light_mesh, chosen), light_mesh, radiosity, self.settings.tolerance)
 
     def relit(self, light_mesh: VirtualLightMesh, radiosity: Float64) -> LightGrid:
         """The grid under other light; radiosity: (n, 3) W/m². In range mode the same, in the other the same trees."""
-
-        def lit(structure: RangeGrid | LitTree | None) -> RangeGrid | LitTree | None:
-            if not isinstance(structure, LitTree):
-                return structure
-            tree = structure.tree
-            return LitTree(tree, light_clusters(tree, light_mesh, radiosity, self.settings.tolerance))
-
-        return replace(self, static=lit(self.static), dynamic=lit(self.dynamic))
+        static, dynamic = (
+            part.relit(light_mesh, radiosity, self.settings.tolerance) if isinstance(part, LitTree) else part
+            for part in (self.static, self.dynamic)
+        )
+        return replace(self, static=static, dynamic=dynamic)
 
     @property
     def structures(self) -> list[tuple[str, RangeGrid | LitTree]]:

@@ -30,7 +30,7 @@ GROUP_SIZE = 64
 # Blocks along each axis of the next larger block.
 BRANCHING = 4
 # Invocations that keep a large device busy: long lists of few blocks are shared among several.
-ENOUGH_INVOCATIONS = 1 << 16
+ENOUGH_INVOCATIONS = 1 << 18
 LEAST_LIGHTS_PER_PART = 64
 # Mesa's llvmpipe ends an invocation's loops after 65,535 rounds in all, without a word. A mask takes up to 16 + 64.
 MOST_LIGHTS_PER_PART = 1 << 15
