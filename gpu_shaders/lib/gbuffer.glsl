@@ -3,6 +3,9 @@
 #ifndef LIB_GBUFFER
 #define LIB_GBUFFER
 
+// Bit beside the model: the eye sees the triangle's clockwise side.
+#define SEEN_FROM_BACK 256
+
 struct Surface {
     vec3 position;          // m, from the local origin
     float depth;            // m along the direction of view
@@ -32,12 +35,18 @@ float balanced_depth(float inverse_distance, float near, float far) {
     return (1.0 - near * inverse_distance) / (1.0 + middle * inverse_distance) * ((far + middle) / (far - near));
 }
 
+// Whether the surface shows its clockwise side, which reflects for the camera as the other one does, but is the inside
+// of a solid. ids: as packed.
+bool seen_from_back(ivec4 ids) {
+    return (ids.w & SEEN_FROM_BACK) != 0;
+}
+
 Surface unpack_surface(
     vec4 position, vec4 shading_normal, vec4 geometric_normal, vec4 base_color, vec4 emission, ivec4 ids
 ) {
     return Surface(
         position.xyz, position.w, shading_normal.xyz, geometric_normal.xyz, base_color.rgb, emission.rgb,
-        shading_normal.w, geometric_normal.w, base_color.w, emission.w, ids.x, ids.y, ids.z, ids.w
+        shading_normal.w, geometric_normal.w, base_color.w, emission.w, ids.x, ids.y, ids.z, ids.w & ~SEEN_FROM_BACK
     );
 }
 #endif

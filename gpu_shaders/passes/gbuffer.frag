@@ -89,5 +89,5 @@ void main() {
     out_geometric_normal = vec4(side * triangle_normal, clamp(metallic, 0.0, 1.0));
     out_base_color = vec4(max(base_color, 0.0), material.specular_ior_level);
     out_emission = vec4(max(emission, 0.0), material.ior);
-    out_ids = ivec4(triangle_ids, model);
+    out_ids = ivec4(triangle_ids, side < 0.0 ? model | SEEN_FROM_BACK : model);
 }

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reflective shadow maps: position, normal and reflected flux of what each lamp sees (seed 003, 4.2.2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.lamps import is_soft, lamp_samples
+from ...core.scene import Float32, Float64, Light
+from ..albedo_texture import AlbedoTexture
+from ..fullscreen import FullscreenPass
+from ..geometry import GpuGeometry
+from ..gpu_layout import CONSTANTS, LAMP
+from ..lamp_records import lamp_record
+from ..rsm_views import FaceView, face_views, map_tiles
+from ..shader_library import ShaderLibrary, set_uniforms
+from .gbuffer import GBufferPass
+from .shadow_map import SINGLE_TILE_FACTOR, SOFT_DIVISOR
+
+if TYPE_CHECKING:
+    import moderngl
+
+LEAST_FACE = 8
+MIP_GROUP_SIDE = 8
+CACHE_BYTES = 1 << 29
+"""Of maps that are kept for all pictures of a frame; those beyond are drawn for each."""
+CHANNELS = 3
+
+
+@dataclass(frozen=True)
+class MapTextures:
+    """What a map is drawn into. framebuffer: position, normal and the finest level of flux."""
+
+    position: moderngl.Texture
+    normal: moderngl.Texture
+    flux: moderngl.Texture
+    framebuffer: moderngl.Framebuffer
+
+
+@dataclass(frozen=True)
+class ReflectiveShadowMap:
+    """What one sample of a lamp sees, and reflects of its share of the lamp; textures of RGBA32F, unfiltered.
+
+    position: m from the local origin, and depth along the face's axis in m. normal: unit shading normal on the lamp's
+    side, and the area in m² that the texel covers. flux: W, and the texel's part of the map: sr of a cube's map, else
+    share of the map; 0 in faces that are not drawn. Its mip levels are sums, down to one texel a face. Where the lamp
+    sees nothing, or the clockwise side of a triangle, all but that part is 0. record: (1,) of gpu_layout.LAMP, with
+    the shadow_* fields of this map. side: texels along a face. brightest: (3,) W/m², the greatest radiosity in it.
+    """
+
+    position: moderngl.Texture
+    normal: moderngl.Texture
+    flux: moderngl.Texture
+    record: np.ndarray
+    side: int
+    brightest: Float32
+
+    @property
+    def levels(self) -> int:
+        """Mip levels of the flux, the finest one counted."""
+        return self.side.bit_length()
+
+    @property
+    def is_cube(self) -> bool:
+        """Whether the map has the faces of a cube, else a single tile."""
+        return int(self.record["shadow_kind"][0]) == CONSTANTS["SHADOW_CUBE"]
+
+    def flux_level(self, level: int) -> Float32:
+        """(h, w, 4) float32 of a mip level, row 0 at the bottom; waits for the device."""
+        width, height = (size >> level for size in self.flux.size)
+        return np.frombuffer(self.flux.read(level=level), np.float32).reshape(height, width, 4)
+
+    def total_flux(self) -> Float64:
+        """(3,) float64 W: all that the surfaces in the map reflect; waits for the device."""
+        return self.flux_level(self.levels - 1)[..., :CHANNELS].sum(axis=(0, 1), dtype=np.float64)
+
+    def bind(self, first_unit: int) -> None:
+        """Binds position, normal and flux to consecutive texture units."""
+        for unit, texture in enumerate((self.position, self.normal, self.flux), first_unit):
+            texture.use(unit)
+
+
+class ReflectiveShadowMapPass:
+    """Draws reflective shadow maps of lamps of every kind. drawn: maps so far."""
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
+        """resolution: texels along a cube's face, taken to the nearest power of two; a map of one tile has twice as
+        many, soft lamps half."""
+        self._context = context
+        self._shaders = shaders
+        most = int(context.info["GL_MAX_TEXTURE_SIZE"]) // 4
+        self._face = 1 << round(math.log2(min(max(resolution, LEAST_FACE), most)))
+        self._gbuffers: dict[int, GBufferPass] = {}
+        self._albedo = AlbedoTexture(context)
+        self._resolve = FullscreenPass(context, shaders, "passes/rsm.frag")
+        self._coarser = shaders.compute("passes/rsm_mip.comp", {"GROUP_SIDE": MIP_GROUP_SIDE})
+        self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
+        self._brightest = context.buffer(reserve=4 * CHANNELS)
+        self.drawn = 0
+
+    def side(self, light: Light) -> int:
+        """Texels along a face of the maps of `light`."""
+        face = self._face if map_tiles(light) != (1, 1) else self._face * SINGLE_TILE_FACTOR
+        return max(face // SOFT_DIVISOR, LEAST_FACE) if is_soft(light) else face
+
+    def size(self, light: Light) -> tuple[int, int]:
+        """Width and height of the maps of `light`, texels."""
+        columns, rows = map_tiles(light)
+        return columns * self.side(light), rows * self.side(light)
+
+    def new_textures(self, light: Light) -> MapTextures:
+        """Textures of the size that maps of `light` need."""
+        import moderngl
+
+        position, normal, flux = (self._context.texture(self.size(light), 4, dtype="f4") for _ in range(3))
+        flux.build_mipmaps(0, self.side(light).bit_length() - 1)
+        for texture in (position, normal):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        flux.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
+        for texture in (position, normal, flux):
+            texture.repeat_x = texture.repeat_y = False
+        return MapTextures(position, normal, flux, self._context.framebuffer([position, normal, flux]))
+
+    def render(
+        self,
+        geometry: GpuGeometry,
+        light: Light,
+        sample_index: int,
+        sample_count: int,
+        textures: MapTextures | None = None,
+    ) -> ReflectiveShadowMap:
+        """The map of one of `sample_count` points of `light`, over which its light is shared, drawn over `textures` if
+        they are given. A lamp with hard shadows has one point."""
+        samples = lamp_samples(light, sample_count)
+        record = lamp_record(light, samples[sample_index % len(samples)], geometry.origin)
+        target = textures or self.new_textures(light)
+        side = self.side(light)
+        target.framebuffer.clear()
+        # New storage: llvmpipe (Mesa 22) lets a write overtake draws that still read the old one.
+        self._brightest.orphan()
+        self._brightest.write(bytes(4 * CHANNELS))
+        views = face_views(light, record, geometry, side) if geometry.triangle_count else []
+        self._lamp.orphan()
+        self._lamp.write(record.tobytes())
+        for face in views:
+            self._draw(target, geometry, face, side, sample_index)
+        self._sum_up(target, side)
+        self.drawn += 1
+        brightest = np.frombuffer(self._brightest.read(), np.float32).copy()
+        return ReflectiveShadowMap(target.position, target.normal, target.flux, record, side, brightest)
+
+    def _draw(self, target: MapTextures, geometry: GpuGeometry, face: FaceView, side: int, sample_index: int) -> None:
+        if side not in self._gbuffers:
+            self._gbuffers[side] = GBufferPass(self._context, self._shaders, side, side)
+        gbuffer = self._gbuffers[side].render(geometry, face.view, sample_index)
+        gbuffer.bind()
+        self._albedo.bind()
+        self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
+        self._brightest.bind_to_storage_buffer(int(CONSTANTS["RESULT_BINDING"]))
+        corner = face.tile[0] * side, face.tile[1] * side
+        set_uniforms(self._resolve.program, {"tile_corner": corner, "extent": face.extent, "side": float(side)})
+        target.framebuffer.viewport = (*corner, side, side)
+        self._resolve.draw(target.framebuffer)
+
+    def _sum_up(self, target: MapTextures, side: int) -> None:
+        """Fills the mip levels of the flux."""
+        width, height = target.flux.size
+        self._context.memory_barrier()
+        for level in range(1, side.bit_length()):
+            target.flux.bind_to_image(0, read=True, write=False, level=level - 1)
+            target.flux.bind_to_image(1, read=False, write=True, level=level)
+            columns, rows = width >> level, height >> level
+            self._coarser.run(-(-columns // MIP_GROUP_SIDE), -(-rows // MIP_GROUP_SIDE))
+            self._context.memory_barrier()
+
+
+class LampReflections:
+    """The maps of a scene's lamps over the pictures of a frame: drawn once, as far as they fit CACHE_BYTES."""
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        geometry: GpuGeometry,
+        lights: Sequence[Light],
+        resolution: int,
+        soft_maps: int,
+    ) -> None:
+        """soft_maps: points of a soft lamp that have a map each."""
+        self._geometry = geometry
+        self._pass = ReflectiveShadowMapPass(context, shaders, resolution)
+        self._sources = [
+            (light, sample, soft_maps)
+            for light in lights
+            if max(light.power) > 0.0
+            for sample in range(soft_maps if is_soft(light) else 1)
+        ]
+        self._kept: dict[int, ReflectiveShadowMap] = {}
+        self._kept_bytes = 0
+        self._shared: dict[tuple[int, int], MapTextures] = {}
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    @property
+    def drawn(self) -> int:
+        """Maps drawn so far."""
+        return self._pass.drawn
+
+    def maps(self) -> Iterator[ReflectiveShadowMap]:
+        """Every map of every lamp that shines; each is valid until the next."""
+        for index, (light, sample, count) in enumerate(self._sources):
+            if index in self._kept:
+                yield self._kept[index]
+                continue
+            size = self._pass.size(light)
+            # Three images of 16 bytes a texel, a third more for the mip levels of one.
+            needed = size[0] * size[1] * 54
+            if self._kept_bytes + needed <= CACHE_BYTES:
+                self._kept[index] = self._pass.render(self._geometry, light, sample, count)
+                self._kept_bytes += needed
+                yield self._kept[index]
+                continue
+            if size not in self._shared:
+                self._shared[size] = self._pass.new_textures(light)
+            yield self._pass.render(self._geometry, light, sample, count, self._shared[size])
