@@ -12,7 +12,7 @@ from tests.light_meshes import random_lights
 from tests.render.rooms import lights_from_triangles
 from vlm_addon.core.active_hemisphere import HalfBalls, make_half_balls, overlaps
 from vlm_addon.core.array_codec import content_hash
-from vlm_addon.core.cell_limit import disc_form_factors
+from vlm_addon.core.cell_limit import BlockDiscs
 from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.form_factor import polygon_form_factor
 from vlm_addon.core.grid_frame import OUTSIDE
@@ -39,6 +39,12 @@ def brute_force(grid):
         same = np.full(low.shape[1], light)
         columns.append(overlaps(grid.half_balls.take(same), low, high))
     return np.stack(columns, axis=1)
+
+
+def ranks_of(shapes, frame, place):
+    """(64, lights) by which full cells of a block choose."""
+    discs = BlockDiscs(shapes.half_balls, shapes.areas, frame.edges, place)
+    return discs.form_factors(np.arange(len(shapes.areas)))
 
 
 def lists_as_table(grid):
@@ -188,7 +194,7 @@ def test_a_full_cell_keeps_the_lights_that_may_give_it_most():
     shapes = light_shapes(lights, free.frame, 5.0)
     for block in range(free.lists.blocks_per_axis**3):
         place = free.lists.block_place(block)
-        worth = disc_form_factors(shapes.half_balls, shapes.areas, free.frame.edges, place)
+        worth = ranks_of(shapes, free.frame, place)
         for cell, bit in zip(*free.lists.cells_of(block), strict=True):
             if before[cell].sum() > limit:
                 order = sorted(np.flatnonzero(before[cell]), key=lambda light: (-worth[bit, light], light))
@@ -231,9 +237,7 @@ def test_a_small_light_gives_no_point_of_a_cell_more_than_its_rank():
         )
         ranks = np.array(
             [
-                disc_form_factors(shapes.half_balls, shapes.areas, grid.frame.edges, grid.lists.block_place(block))[
-                    bit, light
-                ]
+                ranks_of(shapes, grid.frame, grid.lists.block_place(block))[bit, light]
                 for block, bit in zip(blocks[light::60], bits[light::60].astype(int), strict=True)
             ]
         )
@@ -247,7 +251,7 @@ def test_a_rank_is_exact_over_the_middle_of_a_disc():
     """At a cell without extent, over the centroid: A / (pi d² + A)."""
     half_balls = make_half_balls(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.array([1.0]))
     edges = np.array([[0.0, 0.0], [0.0, 0.0], [0.25, 0.25]], np.float32)
-    worth = disc_form_factors(half_balls, np.array([0.1]), edges, np.zeros(3, int))
+    worth = BlockDiscs(half_balls, np.array([0.1]), edges, np.zeros(3, int)).form_factors(np.array([0]))
     assert worth[0, 0] == pytest.approx(0.1 / (np.pi * 0.25**2 + 0.1), rel=1e-6)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .active_hemisphere import Bools, HalfBalls
-from .block_masks import CELLS, SIDE, BlockTests, Masks, block_edges, expand, unpacked
+from .block_masks import CELLS, SIDE, BlockTests, Masks, block_edges, cells_along, expand, unpacked
 from .errors import InvalidInput
 from .progress import Progress, silent, step
 from .scene import Float32
@@ -76,6 +76,11 @@ class BlockLists:
         """(3,) place of a block along the axes."""
         b = self.blocks_per_axis
         return np.array([block % b, block // b % b, block // b**2])
+
+    def all_cells(self) -> Masks:
+        """(blocks,) masks of all cells that each block has."""
+        x, y, z = cells_along(self.cells_per_axis)
+        return (z[:, None, None] * y[:, None] * x).reshape(-1)
 
     def with_masks(self, masks: Masks) -> BlockLists:
         """These lists with other masks, without the pairs whose mask is 0."""

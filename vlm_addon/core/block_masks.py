@@ -55,7 +55,7 @@ class BlockTests:
         self._starts = np.cumsum(counts, axis=1) - counts
         self._terms = [axis_terms(half_balls, edges, axis, firsts[axis], counts[axis]) for axis in range(3)]
         self._bounds = [_axis_bounds(terms) for terms in self._terms]
-        self._cells = _cells_along(edges.shape[1] - 1)
+        self._cells = cells_along(edges.shape[1] - 1)
 
     def masks(self, members: Ints, offsets: Ints) -> Masks:
         """(m,) bits of the cells that half ball members[i] reaches in the block at offsets[:, i] in its box.
@@ -126,7 +126,7 @@ def _axis_bounds(terms: Floats) -> Floats:
     return np.stack((least[NEAR], most[NEAR], most[FAR], least[HEIGHT], most[HEIGHT], least[NEAR_HEIGHT]))
 
 
-def _cells_along(cells_per_axis: int) -> list[Masks]:
+def cells_along(cells_per_axis: int) -> list[Masks]:
     """Per axis (b,) factors, of which the product is the bits of the cells that a block has."""
     counts = np.minimum(cells_per_axis - np.arange(0, cells_per_axis, SIDE), SIDE)
     by_count = [[sum(1 << step * i for i in range(count)) for count in counts] for step in (1, SIDE, SIDE**2)]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .active_hemisphere import COORDINATE_STEP, Bools, HalfBalls
+from .active_hemisphere import COORDINATE_STEP, Bools, Floats, HalfBalls
 from .block_lists import THREADS, BlockLists
-from .block_masks import CELLS, SIDE, cell_sums, packed
+from .block_masks import CELLS, SIDE, Masks, cell_sums, packed, unpacked
 from .progress import Progress, silent, step
 from .scene import Float32, Float64
 
@@ -22,6 +22,7 @@ Ints = npt.NDArray[Any]
 _BLOCKS_PER_TASK = 64
 # Stands for the squared distance 0: of coordinates' rounding.
 _LEAST_SQUARED = np.float32(COORDINATE_STEP**2)
+_BITS_OF_BYTE = np.array([byte.bit_count() for byte in range(256)], np.uint8)
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def limited(
 ) -> tuple[BlockLists, Occupancy]:
     """`lists` with at most `max_lights` lights a cell (0: any number), and what that leaves out.
 
-    A full cell keeps the lights of the greatest `disc_form_factors` in it, of equal ones those of lower id.
+    A full cell keeps the lights of the greatest form factors (`BlockDiscs`) in it, of equal ones those of lower id.
     areas: (n,) of each light, in the grid's frame. Raises Cancelled.
     """
     bit_counts = lists.bit_counts()
@@ -76,19 +77,21 @@ def limited(
     overflowing = np.flatnonzero(counts > max_lights) if max_lights else np.zeros(0, np.int64)
     dropped = np.zeros(len(half_balls), np.uint32)
     if len(overflowing):
-        masks, lost = lists.masks.copy(), np.zeros(len(lists.masks), np.uint8)
+        masks, all_cells = lists.masks.copy(), lists.all_cells()
 
         def trim(blocks: Ints) -> None:
             for block in blocks:
                 rows = slice(int(lists.offsets[block]), int(lists.offsets[block + 1]))
-                lights, reached = lists.light_ids[rows], lists.reached(block)
-                place = lists.block_place(block)
-                worth = disc_form_factors(half_balls.take(lights), areas[lights], edges, place)
-                kept = _kept(reached, bit_counts[block], worth, max_lights)
-                masks[rows], lost[rows] = packed(kept), (reached & ~kept).sum(axis=0)
+                lights = lists.light_ids[rows]
+                discs = BlockDiscs(half_balls.take(lights), areas[lights], edges, lists.block_place(block))
+                some = discs.ever_among(max_lights, lists.masks[rows] == all_cells[block])
+                reached, counts = unpacked(lists.masks[rows][some]), bit_counts[block]
+                kept = np.zeros(len(lights), np.uint64)
+                kept[some] = packed(_kept(reached, counts, discs.form_factors(some), max_lights))
+                masks[rows] = kept
 
         _in_parallel(trim, np.unique(lists.places(overflowing)[0]), progress)
-        dropped = np.bincount(lists.light_ids, lost, len(half_balls)).astype(np.uint32)
+        dropped = np.bincount(lists.light_ids, _bits_set(lists.masks ^ masks), len(half_balls)).astype(np.uint32)
         lists = lists.with_masks(masks)
     reached_entries, dropped_entries = int(counts.sum(dtype=np.int64)), int(dropped.sum(dtype=np.int64))
     return lists, Occupancy(
@@ -114,24 +117,57 @@ def _in_parallel(work: Callable[[Ints], None], blocks: Ints, progress: Progress)
                 task.cancel()
 
 
-def disc_form_factors(half_balls: HalfBalls, areas: Float64, edges: Float32, place: Ints) -> Float32:
-    """(CELLS, m) float32: about the greatest form factor of each light at a point of each of a block's cells.
+class BlockDiscs:
+    """About the greatest form factor of each of m lights at a point of each of a block's cells.
 
     Of a disc of the light's area A, seen by what faces it: A cos' / (pi d² + A) with the least distance d of its centre
     from the cell and cos' <= h / d for the greatest height h of the cell over its plane; exact over the disc's middle.
-    half_balls, areas: of m lights, in the grid's frame. place: (3,) of the block along the axes.
     """
-    cells = np.minimum(SIDE * place[:, None] + np.arange(SIDE), edges.shape[1] - 2)
-    near_terms, height_terms = [], []
-    for faces, along, centre, normal in zip(edges, cells, half_balls.centres, half_balls.normals, strict=True):
-        low, high = faces[along][:, None] - centre, faces[along + 1][:, None] - centre
-        near_terms.append(np.square(np.maximum(low, np.minimum(high, 0.0))))
-        height_terms.append(np.maximum(normal * low, normal * high))
-    squared = np.maximum(cell_sums(*near_terms).reshape(CELLS, -1), _LEAST_SQUARED)
-    heights = cell_sums(*height_terms).reshape(CELLS, -1)
-    shares = (areas / np.pi).astype(np.float32)
-    cosines = np.clip(heights / np.sqrt(squared), 0.0, 1.0)
-    return np.asarray(shares * cosines / (squared + shares))
+
+    def __init__(self, half_balls: HalfBalls, areas: Float64, edges: Float32, place: Ints) -> None:
+        """half_balls, areas: of the lights, in the grid's frame. place: (3,) of the block along the axes."""
+        cells = np.minimum(SIDE * place[:, None] + np.arange(SIDE), edges.shape[1] - 2)
+        low, high = (np.take_along_axis(edges, cells + end, axis=1)[:, :, None] for end in (0, 1))
+        centres, normals = half_balls.centres[:, None], half_balls.normals[:, None]
+        low, high = low - centres, high - centres
+        self._squared = np.square(np.maximum(low, np.minimum(high, 0.0)))
+        self._heights = np.maximum(normals * low, normals * high)
+        self._shares = (areas / np.pi).astype(np.float32)
+
+    def form_factors(self, some: Ints) -> Float32:
+        """(CELLS, k) float32, of the lights of these k rows."""
+        squared, heights = (
+            cell_sums(*np.take(terms, some, axis=2)).reshape(CELLS, -1) for terms in (self._squared, self._heights)
+        )
+        return self._of(squared, heights, self._shares[some])
+
+    def ever_among(self, most: int, whole: Bools) -> Ints:
+        """Rows of the lights that can be among the `most` best of any cell; whole: (m,) those that reach all cells.
+
+        Rounding is monotonic, so the terms' bounds over the block bound the form factors in its cells.
+        """
+        if whole.sum() < most:
+            return np.arange(len(whole))
+        nearest, highest = (_total(reduce(axis=1)) for reduce in (self._squared.min, self._heights.max))
+        farthest, lowest = (_total(reduce(axis=1)) for reduce in (self._squared.max, self._heights.min))
+        least = self._of(farthest, lowest, self._shares)[whole]
+        enough = np.partition(least, len(least) - most)[len(least) - most]
+        return np.flatnonzero(self._of(nearest, highest, self._shares) >= enough)
+
+    @staticmethod
+    def _of(squared: Floats, heights: Floats, shares: Floats) -> Float32:
+        squared = np.maximum(squared, _LEAST_SQUARED)
+        cosines = np.clip(heights / np.sqrt(squared), 0.0, 1.0)
+        return np.asarray(shares * cosines / (squared + shares))
+
+
+def _total(terms: Floats) -> Floats:
+    return np.asarray((terms[0] + terms[1]) + terms[2])
+
+
+def _bits_set(masks: Masks) -> npt.NDArray[np.uint8]:
+    """(m,) how many bits of each mask are set."""
+    return _BITS_OF_BYTE[masks.view(np.uint8)].reshape(-1, 8).sum(axis=1, dtype=np.uint8)
 
 
 def _kept(reached: Bools, counts: Ints, worth: Float32, most: int) -> Bools:
