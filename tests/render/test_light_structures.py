@@ -212,6 +212,55 @@ def test_nothing_pops_over_a_thousand_frames(own_device: Device, frames: Callabl
     check_motion(own_device, frames(1000), 0.02)
 
 
+@pytest.mark.parametrize("tolerance", [0.01, 0.02, 0.05, 0.1])
+def test_a_picture_of_a_lit_room_keeps_the_tolerance(device: Device, tolerance: float) -> None:
+    """A lamp, walls of several colours, and a glowing quad across the room; errors over pixels."""
+    room = box_room()
+    lights = join([wall_lights(room), turning_lights(0.4)])
+    size = {"width": 96, "height": 72}
+    found = indirect(device.render(room, lights, replace(settings(tolerance=tolerance), **size)))
+    exact = indirect(device.render(room, lights, replace(settings(lights="all"), **size)))
+    lit = exact > 0.0
+    errors = np.abs(found - exact)[lit] / np.maximum(exact[lit], 0.1 * exact[lit].mean())
+    assert np.quantile(errors, 0.95) <= tolerance
+    assert np.quantile(errors, 0.999) <= 3.0 * tolerance
+
+
+@pytest.mark.parametrize("lights", ["tolerance", "range"])
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_neither_size_nor_place_of_the_world_shows(device: Device, factor: float, lights: str) -> None:
+    """A room of 2 mm and one of 2 km, a thousand rooms away from the origin, lit as brightly."""
+    offset = np.array([1000.0, -2000.0, 500.0])
+
+    def moved(points: Float64) -> Float64:
+        return factor * (points + offset)
+
+    room = box_room()
+    still = wall_lights(room)
+    camera = room.camera
+    assert camera is not None
+    matrix = camera.matrix_world.copy()
+    matrix[:3, 3] = moved(matrix[:3, 3])
+    lamp = replace(
+        room.lights[0],
+        power=tuple(np.multiply(factor**2, room.lights[0].power)),
+        position=tuple(moved(np.array(room.lights[0].position))),
+    )
+    far = replace(
+        room,
+        meshes=tuple(replace(mesh, positions=moved(mesh.positions)) for mesh in room.meshes),
+        lights=(lamp,),
+        camera=replace(camera, matrix_world=matrix, clip_start=factor * 0.1, clip_end=factor * 1000.0),
+    )
+    samples = replace(still.samples, positions=moved(still.samples.positions))
+    far_lights = replace(still, vertices=moved(still.vertices), samples=samples)
+    here = indirect(device.render(room, still, settings(lights="all" if lights == "tolerance" else lights, grid=5)))
+    there = indirect(device.render(far, far_lights, settings(lights=lights, grid=5)))
+    off = np.abs(there - here) / np.maximum(here, 0.1 * here.mean())
+    # Lights and pixels may fall to the other side of a cell's face.
+    assert np.quantile(off, 0.95) <= (1e-3 if lights == "range" else 0.02)
+
+
 def floor_from_above(width: int) -> SceneSnapshot:
     """A strip of floor seen from above, one row of pixels of a flat surface."""
     strip = quad((0.0, 0.9, 0.0), (2.0, 0.0, 0.0), (0.0, 0.2, 0.0), name="floor")

@@ -272,3 +272,23 @@ def test_size_does_not_matter(device: Device, scale: float) -> None:
     pixels.positions = (scale * pixels.positions.astype(float)).astype(np.float32)
     lights.vertices[:] *= scale
     assert clustered(device, pixels, lights, radiosity) == pytest.approx(found, rel=1e-3, abs=1e-4)
+
+
+def test_lights_without_area_among_others_change_nothing(device: Device) -> None:
+    generator = np.random.default_rng(15)
+    lights, pixels = box_lights(8, generator), room_pixels(generator)
+    lights.vertices.reshape(-1, 3, 3)[::7] = lights.vertices.reshape(-1, 3, 3)[::7, :1]
+    radiosity = np.ones((len(lights), 3), np.float32)
+    found = clustered(device, pixels, lights, radiosity)
+    assert np.isfinite(found).all()
+    assert found == pytest.approx(cut(pixels, lights, radiosity), rel=1e-3, abs=1e-4)
+
+
+def test_lights_all_in_one_place(device: Device) -> None:
+    """5,000 times the same light: no cell tells them apart."""
+    generator = np.random.default_rng(16)
+    one = random_lights(generator, 1, 0.3)
+    lights = lights_from_triangles(np.repeat(one.corners, 5000, axis=0))
+    pixels, radiosity = Pixels(generator, (20, 20)), np.full((5000, 3), 1e-3, np.float32)
+    found = clustered(device, pixels, lights, radiosity)
+    assert found == pytest.approx(cut(pixels, lights, radiosity), rel=1e-3, abs=1e-4)

@@ -72,8 +72,9 @@ class ClusteredPhaseTwoPass:
         """As PhaseTwoPass.render, but for what the clusters differ from their lights."""
         tiles = self._tile_bounds.render(gbuffer)
         self._irradiance.clear()
-        self.tiles += len(tiles.shown())
-        for share, lists in self._walk.lists(tiles, forest):
+        shown = tiles.shown()
+        self.tiles += len(shown)
+        for share, lists in self._walk.lists(tiles, shown, forest):
             self.entries += lists.count
             self._add(tiles, lists, gbuffer, lights, radiosity, forest)
             step(progress, share, "phase two")

@@ -92,13 +92,15 @@ class TileWalkPass:
             for of_lights in (False, True)
         }
 
-    def lists(self, tiles: Tiles, forest: GpuLightForest) -> Iterator[tuple[float, TileLists]]:
-        """What lights the tiles, part by part, each after the share of the tiles that was begun with.
+    def lists(
+        self, tiles: Tiles, shown: npt.NDArray[np.uint32], forest: GpuLightForest
+    ) -> Iterator[tuple[float, TileLists]]:
+        """What lights the tiles `shown`, part by part, each after the share of them that was begun with.
 
         Over all parts each cluster and light that has weight and is not dark, turned away or below the horizon for all
         of a tile comes up once for it. Raises DeviceError where a tile alone needs more than the device's blocks hold.
         """
-        shown, roots = tiles.shown(), forest.roots
+        roots = forest.roots
         if not len(roots):
             return
         # No sum of counts exceeds 32 bits, for a tile meets nothing twice.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 TOLERANCE, RANGE, ALL = "tolerance", "range", "all"
 FEW_LIGHTS = 400
-"""Up to so many, the sum over all lights costs about as much as clusters: measured at 160 in a box, 600 in the atrium."""
+"""Up to so many, all lights cost about what clusters do: measured up to 160 in a box, 600 in the atrium."""
 
 
 def _of_grid(name: str, only_with: str) -> Any:
