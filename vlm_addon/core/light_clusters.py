@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from .light_mesh import VirtualLightMesh
 from .light_tree import ROOT, LightTree
-from .light_tree_bounds import facing_height, horizon_height
+from .light_tree_bounds import PAIRS, column_cross, facing_height, horizon_height, place_moments, symmetric
 from .scene import Float64
 
 FADE = 0.2
@@ -27,7 +27,7 @@ SOFTNESS = math.sqrt(3.0)
 # Error of a cluster at a distance d, as a share of power / (pi d²), found on the atrium under smooth light and under
 # lamps that light from 20 to some hundreds of 100,000 lights (tests/core/test_light_cut_accuracy.py):
 # _SIZE_ERROR (radius / d)^4, because four points have the lights' mean and spread but not their shape;
-_SIZE_ERROR = 0.12
+_SIZE_ERROR = 0.16
 # _NORMAL_ERROR sqrt(1 - flux / power), because normals are not spread evenly;
 _NORMAL_ERROR = 0.42
 # _HORIZON_ERROR spread / d, which happens where a horizon cuts through: seldom, so not added to the others.
@@ -39,12 +39,14 @@ _DARK = 1e-20
 
 @dataclass(frozen=True)
 class LightClusters:
-    """Per cluster: power (c,) W, sum over the channels. mean: (c, 3) m, of the power. axes: (c, 2, 3) m, standard
-    deviations along its two longest directions. flux: (c, 3) W, power times normal. normal_spread: (c, 3, 3) W²,
-    covariance of the normals times power². colour: (c, 3), shares of the channels in the power. window: (c,) m,
-    distance of the centroid up to which its lights count instead of it; none count from (1 + FADE) times that on.
-    least_squared: (c,) m², what the squares of distances to the four points are not taken to be less than, so that no
-    point of a cluster gives more than a light of its mean radiosity.
+    """power: (c,) W, sum over the channels. mean: (c, 3) m, of the power.
+
+    axes: (c, 2, 3) m, along the tree's plane_axes: their products with themselves add up to the power's covariance in
+    that plane. flux: (c, 3) W, power times normal. normal_spread: (c, 3, 3) W², covariance of the normals times power².
+    colour: (c, 3), shares of the channels in the power. window: (c,) m, distance of the centroid up to which its lights
+    count instead of it; none count from (1 + FADE) times that on. least_squared: (c,) m², what the squares of distances
+    to the four points are not taken to be less than, so that no point of a cluster gives more than a light of its mean
+    radiosity.
     """
 
     power: Float64
@@ -58,57 +60,54 @@ class LightClusters:
 
 
 def light_clusters(
-    tree: LightTree, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float
+    tree: LightTree,
+    light_mesh: VirtualLightMesh,
+    radiosity: Float64,
+    tolerance: float,
+    mean_irradiance: float | None = None,
 ) -> LightClusters:
-    """radiosity: (n, 3) float64, W/m². tolerance: error of the irradiance, as a share of it."""
-    areas = light_mesh.areas
+    """radiosity: (n, 3) float64, W/m², of all lights. tolerance: error of the irradiance, as a share of it.
+
+    mean_irradiance: W/m², sum over the channels, over the surfaces that are to be lit; as the lights' own surfaces
+    would receive in a closed room (power / area of all lights) where it is not given.
+    """
     # Near the lights, so that differences of squares keep their digits.
     origin = tree.centroid.mean(axis=0) if len(tree) else np.zeros(3)
-    sums = tree.sums(_moments(light_mesh.corners - origin, light_mesh.area_vectors, radiosity))
-    power, flux, mean = sums[0], sums[1:4].T, sums[16:19].T
-    total_power, total_area = float(areas @ radiosity.sum(axis=1)), float(areas.sum())
+    areas, moments = _moments(light_mesh.corners - origin, radiosity)
+    sums = tree.sums(moments)
+    power, flux, mean = sums[0], sums[1:4].T, sums[4:7].T
+    total_power, total_area = float(moments[0].sum()), float(areas.sum())
     # What gives less than this share of all light is met as if it gave so much.
     lit = np.maximum(power, max(_DARK * total_power, float(np.finfo(float).tiny)))
     mean = np.where((power > 0.0)[:, None], mean / lit[:, None], tree.centroid - origin)
-    spread = _symmetric(sums[4:10] / lit) - np.einsum("ci,cj->cij", mean, mean)
-    axes = _longest_axes(spread)
-    mean_radiosity = total_power / max(total_area, float(np.finfo(float).tiny))
+    spread = symmetric(sums[7:13] / lit) - np.einsum("ci,cj->cij", mean, mean)
+    axes = _axes_along(spread, tree.plane_axes)
+    if mean_irradiance is None:
+        mean_irradiance = total_power / max(total_area, float(np.finfo(float).tiny))
     return LightClusters(
         power=power,
         mean=mean + origin,
         axes=axes,
         flux=flux,
-        normal_spread=lit[:, None, None] * _symmetric(sums[10:16]) - np.einsum("ci,cj->cij", flux, flux),
+        normal_spread=lit[:, None, None] * symmetric(sums[13:19]) - np.einsum("ci,cj->cij", flux, flux),
         colour=sums[20:].T / lit[:, None],
         # A quarter of the disc that has the power at the mean radiosity of the lights, each by its power.
         least_squared=lit * lit / (4.0 * np.pi * np.maximum(sums[19], np.finfo(float).tiny)),
-        window=_windows(tree, lit, flux, axes, tolerance * mean_radiosity),
+        window=_windows(tree, lit, flux, axes, tolerance * mean_irradiance),
     )
 
 
-_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-
-
-def _moments(corners: Float64, area_vectors: Float64, radiosity: Float64) -> Float64:
-    """(23, n) what each light adds to its clusters: rows in the order in which light_clusters takes them apart."""
-    areas = np.linalg.norm(area_vectors, axis=1)
-    corners, coloured = corners.transpose(1, 2, 0), radiosity.T * areas
-    centroids = corners.mean(axis=0)
-    arms = corners - centroids
-    normals = area_vectors.T / np.where(areas > 0.0, areas, 1.0)
-    power = coloured.sum(axis=0)
-    places = [(arms[:, i] * arms[:, j]).sum(axis=0) / 12.0 + centroids[i] * centroids[j] for i, j in _PAIRS]
-    products = [normals[i] * normals[j] for i, j in _PAIRS]
-    weighted = (*normals, *places, *products, *centroids, radiosity.sum(axis=1))
-    return np.stack([power, *(power * row for row in weighted), *coloured])
-
-
-def _symmetric(rows: Float64) -> Float64:
-    """(c, 3, 3) from (6, c) in the order of _PAIRS."""
-    matrix = np.empty((rows.shape[1], 3, 3))
-    for row, (i, j) in zip(rows, _PAIRS, strict=True):
-        matrix[:, i, j] = matrix[:, j, i] = row
-    return matrix
+def _moments(corners: Float64, radiosity: Float64) -> tuple[Float64, Float64]:
+    """(n,) areas and (23, n) what each light adds to its clusters, rows as light_clusters takes them apart."""
+    areas, places = place_moments(corners)
+    a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    normals = 0.5 * column_cross(b - a, c - a) / np.where(areas > 0.0, areas, 1.0)
+    products = [normals[i] * normals[j] for i, j in PAIRS]
+    coloured = np.ascontiguousarray(radiosity.T)
+    total = coloured[0] + coloured[1] + coloured[2]
+    power = total * areas
+    weighted = (*normals, *places, *products, total)
+    return areas, np.stack([power, *(power * row for row in weighted), *(areas * row for row in coloured)])
 
 
 def cluster_irradiance(
@@ -144,10 +143,29 @@ def _softened(value: Float64, width: Float64) -> Float64:
     return np.where(value > width, value, inside * (inside / (4.0 * width)))
 
 
-def _longest_axes(spread: Float64) -> Float64:
-    """(c, 2, 3) square roots of the two greatest principal parts of symmetric matrices (c, 3, 3)."""
-    values, vectors = np.linalg.eigh(spread)
-    return np.stack([np.sqrt(np.maximum(values[:, k], 0.0))[:, None] * vectors[:, :, k] for k in (2, 1)], axis=1)
+def _axes_along(spread: Float64, plane_axes: Float64) -> Float64:
+    """(c, 2, 3) vectors in planes, spanned by orthonormal pairs (c, 2, 3), with the planes' part of the covariances.
+
+    spread: (c, 3, 3). The square root of a symmetric matrix changes steadily with it, unlike its principal axes.
+    """
+    first, second = plane_axes[:, 0], plane_axes[:, 1]
+    along_first = (spread @ first[:, :, None])[:, :, 0]
+    xx, xy = (along_first * first).sum(-1), (along_first * second).sum(-1)
+    yy = ((spread @ second[:, :, None])[:, :, 0] * second).sum(-1)
+    # Rounding may leave what is no covariance.
+    xx, yy = np.maximum(xx, 0.0), np.maximum(yy, 0.0)
+    xy = np.clip(xy, -np.sqrt(xx * yy), np.sqrt(xx * yy))
+    root = np.sqrt(np.maximum(xx * yy - xy * xy, 0.0))
+    scale = np.sqrt(np.maximum(xx + yy + 2.0 * root, np.finfo(float).tiny))
+    axes = [[xx + root, xy], [xy, yy + root]]
+    return np.stack([((x / scale)[:, None] * first + (y / scale)[:, None] * second) for x, y in axes], axis=1)
+
+
+def cluster_error(tree: LightTree, clusters: LightClusters, rows: npt.NDArray[np.intp], distances: Float64) -> Float64:
+    """(m,) W/m², sum over the channels: about what cluster rows[i] may be wrong by at distances[i] of its centroid."""
+    power = np.maximum(clusters.power[rows], np.finfo(float).tiny)
+    share = _SIZE_ERROR * (tree.radius[rows] / distances) ** 4 + _normal_error(power, clusters.flux[rows])
+    return np.asarray(share * power / (np.pi * distances**2))
 
 
 def _windows(tree: LightTree, power: Float64, flux: Float64, axes: Float64, allowed: float) -> Float64:

@@ -18,7 +18,15 @@ import numpy as np
 import numpy.typing as npt
 
 from .light_mesh import VirtualLightMesh
-from .light_tree_bounds import Shapes, empty_shapes, farthest_corners, join_upwards, light_shapes
+from .light_tree_bounds import (
+    Shapes,
+    empty_shapes,
+    farthest_corners,
+    join_upwards,
+    light_shapes,
+    place_moments,
+    symmetric,
+)
 from .scene import Float64, Int32
 
 Int64 = npt.NDArray[np.int64]
@@ -41,7 +49,8 @@ class LightTree:
     cell_size, m, and start at cell_origin. tag_ids: (c,) int32. light_order: (m,) int32, the lights in order of their
     clusters; light_offsets: (c + 1,) int32, those of cluster i are light_order[light_offsets[i]:light_offsets[i + 1]].
     child_offsets: (c + 1,) int32, the clusters in cluster i are child_offsets[i] to child_offsets[i + 1] - 1.
-    shapes: where the lights of each cluster lie and which way they face.
+    shapes: where the lights of each cluster lie and which way they face. plane_axes: (c, 2, 3) orthonormal, the two
+    directions in which its area spreads most.
     """
 
     light_parent: Int32
@@ -55,6 +64,7 @@ class LightTree:
     cell_origin: Float64
     cell_size: float
     shapes: Shapes
+    plane_axes: Float64
 
     def __len__(self) -> int:
         return len(self.parent)
@@ -114,7 +124,10 @@ def build_light_tree(light_mesh: VirtualLightMesh, chosen: Bools | None = None) 
     light_parent = np.full(len(light_mesh), ROOT, np.int32)
     if len(rows) == 0:
         none, offsets = np.zeros(0, np.int32), np.zeros(1, np.int32)
-        return LightTree(light_parent, none, none, none, none, none, offsets, offsets, np.zeros(3), 1.0, empty_shapes())
+        axes = np.zeros((0, 2, 3))
+        return LightTree(
+            light_parent, none, none, none, none, none, offsets, offsets, np.zeros(3), 1.0, empty_shapes(), axes
+        )
     lights = light_shapes(light_mesh.corners[rows])
     grid = _grid(lights.centroid, lights.radius)
     facing, tags = _facing(lights.axis), light_mesh.tag_ids[rows]
@@ -136,11 +149,23 @@ def build_light_tree(light_mesh: VirtualLightMesh, chosen: Bools | None = None) 
         cell_origin=grid.origin,
         cell_size=grid.cell,
         shapes=empty_shapes(),
+        plane_axes=np.zeros((0, 2, 3)),
     )
     members = lights.take(order[by_cluster])
     shapes = join_upwards(members, tree.light_offsets, tree.child_offsets, tree.depths())
     radius = farthest_corners(light_mesh.corners, light_parent, links.parent, shapes.centroid)
-    return replace(tree, shapes=replace(shapes, radius=radius))
+    tree = replace(tree, shapes=replace(shapes, radius=radius))
+    return replace(tree, plane_axes=_plane_axes(tree, light_mesh.corners))
+
+
+def _plane_axes(tree: LightTree, corners: Float64) -> Float64:
+    """As in LightTree."""
+    areas, moments = place_moments(corners - tree.centroid.mean(axis=0))
+    sums = tree.sums(areas * np.concatenate([np.ones((1, len(areas))), moments]))
+    covariance = symmetric(sums[4:] / np.maximum(sums[0], np.finfo(float).tiny))
+    mean = sums[1:4].T / np.maximum(sums[0], np.finfo(float).tiny)[:, None]
+    vectors = np.linalg.eigh(covariance - np.einsum("ci,cj->cij", mean, mean))[1]
+    return np.ascontiguousarray(vectors[:, :, :0:-1].transpose(0, 2, 1))
 
 
 @dataclass(frozen=True)

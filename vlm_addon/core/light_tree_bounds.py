@@ -120,15 +120,19 @@ def _joined(members: Shapes, starts: npt.NDArray[np.intp], owner: npt.NDArray[np
 
 def farthest_corners(corners: Float64, light_parent: Int32, parent: Int32, centroid: Float64) -> Float64:
     """(c,) m, distance of the farthest corner of a cluster's lights from its centroid; parents below 0 are none."""
-    radius = np.zeros(len(parent))
+    squared = np.zeros(len(parent))
     inside = light_parent >= 0
-    corners, cluster = corners[inside], light_parent[inside]
+    # Component by component: numpy is slow where the last axis is short.
+    columns, cluster = np.ascontiguousarray(corners[inside].transpose(1, 2, 0)), light_parent[inside]
+    centre = np.ascontiguousarray(centroid.T)
     while len(cluster):
-        arms = corners - centroid[cluster, None]
-        np.maximum.at(radius, cluster, np.sqrt((arms * arms).sum(-1).max(-1)))
+        x, y, z = (row[cluster] for row in centre)
+        reach = [(p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2 for p in columns]
+        np.maximum.at(squared, cluster, np.maximum(np.maximum(reach[0], reach[1]), reach[2]))
         cluster = parent[cluster]
-        corners, cluster = corners[cluster >= 0], cluster[cluster >= 0]
-    return radius
+        inner = cluster >= 0
+        columns, cluster = columns[:, :, inner], cluster[inner]
+    return np.sqrt(squared)
 
 
 def angle(a: Float64, b: Float64) -> Float64:
@@ -159,3 +163,33 @@ def horizon_height(shapes: Shapes, points: Float64, normals: Float64) -> Float64
     """
     centre, half = 0.5 * (shapes.low + shapes.high), 0.5 * (shapes.high - shapes.low)
     return np.asarray(((centre - points) * normals).sum(-1) + (half * np.abs(normals)).sum(-1))
+
+
+PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+"""Entries of a symmetric matrix that `place_moments` and `symmetric` go through, in this order."""
+
+
+def place_moments(corners: Float64) -> tuple[Float64, Float64]:
+    """(n,) areas of triangles (n, 3, 3) and (9, n) means over each of its places (3 rows) and of their products (6).
+
+    Component by component: numpy is slow where the last axis is short.
+    """
+    a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    x, y, z = column_cross(b - a, c - a)
+    centroids = (a + b + c) / 3.0
+    arms = a - centroids, b - centroids, c - centroids
+    products = [sum(arm[i] * arm[j] for arm in arms) / 12.0 + centroids[i] * centroids[j] for i, j in PAIRS]
+    return 0.5 * np.sqrt(x * x + y * y + z * z), np.stack([*centroids, *products])
+
+
+def column_cross(u: Float64, v: Float64) -> Float64:
+    """(3, n) cross products of columns."""
+    return np.stack([u[i] * v[j] - u[j] * v[i] for i, j in ((1, 2), (2, 0), (0, 1))])
+
+
+def symmetric(rows: Float64) -> Float64:
+    """(c, 3, 3) from (6, c) in the order of PAIRS."""
+    matrix = np.empty((rows.shape[1], 3, 3))
+    for row, (i, j) in zip(rows, PAIRS, strict=True):
+        matrix[:, i, j] = matrix[:, j, i] = row
+    return matrix
