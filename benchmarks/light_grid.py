@@ -27,7 +27,8 @@ from vlm_addon.core.range_grid import light_shapes
 from vlm_addon.core.scene import Float32
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.render.device import Device
-from vlm_addon.render.passes.light_grid import GROUP_SIZE, MOST_LIGHTS_PER_PART, LightGridPass, half_ball_records
+from vlm_addon.render.passes.light_grid import MOST_LIGHTS_PER_PART, LightGridPass, half_ball_records
+from vlm_addon.render.prefix_sum import INVOCATIONS
 from vlm_addon.render.shader_library import set_uniforms
 from vlm_addon.terminal import table
 
@@ -142,17 +143,17 @@ def timed(device: Device, work: Callable[[], Any]) -> Timed:
 def brute_force(device: Device, half_balls: HalfBalls, edges: Float32, max_lights: int, part: int) -> Any:
     """(cells, max_lights) uint32 lists of one in `part` groups of cells, by the thesis's shader."""
     context = device.context
-    shader = device.shaders.compute(BRUTE_FORCE, {"GROUP_SIZE": GROUP_SIZE})
+    shader = device.shaders.compute(BRUTE_FORCE, {"GROUP_SIZE": INVOCATIONS})
     cells_per_axis = edges.shape[1] - 1
-    groups = -(-(cells_per_axis**3) // (GROUP_SIZE * part))
+    groups = -(-(cells_per_axis**3) // (INVOCATIONS * part))
     records = context.buffer(half_ball_records(half_balls).tobytes())
     faces = context.buffer(edges.tobytes())
-    lists = context.buffer(reserve=4 * groups * GROUP_SIZE * max_lights)
-    counts = context.buffer(reserve=4 * groups * GROUP_SIZE)
+    lists = context.buffer(reserve=4 * groups * INVOCATIONS * max_lights)
+    counts = context.buffer(reserve=4 * groups * INVOCATIONS)
     for binding, buffer in enumerate((records, faces, lists, counts)):
         buffer.bind_to_storage_buffer(binding)
     values = {"cells_per_axis": cells_per_axis, "light_count": len(half_balls), "max_lights": max_lights}
-    chunk = max(1, TESTS_PER_DISPATCH // (GROUP_SIZE * MOST_LIGHTS_PER_PART))
+    chunk = max(1, TESTS_PER_DISPATCH // (INVOCATIONS * MOST_LIGHTS_PER_PART))
     for first_light in range(0, len(half_balls), MOST_LIGHTS_PER_PART):
         end_light = min(first_light + MOST_LIGHTS_PER_PART, len(half_balls))
         values |= {"first_light": first_light, "end_light": end_light}
@@ -169,7 +170,7 @@ def require_same(lists: BlockLists, by_shaders: BlockLists, brute_buffer: Any, p
     fullest = int(counts.max())
     found = np.frombuffer(brute_buffer.read(), np.uint32).reshape(-1, fullest)
     slots = np.arange(len(found))
-    cells = slots // GROUP_SIZE * GROUP_SIZE * part + slots % GROUP_SIZE
+    cells = slots // INVOCATIONS * INVOCATIONS * part + slots % INVOCATIONS
     found, cells = found[cells < len(counts)], cells[cells < len(counts)]
     filled = np.arange(fullest) < counts[cells][:, None]
     expected = lists.cell_lists(cells)[1]

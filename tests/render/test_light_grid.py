@@ -126,14 +126,3 @@ def test_can_be_cancelled(device, monkeypatch):
             light_shapes(random_lights(1), frame, 4.0).half_balls, frame.edges, stop
         )
     assert len(seen) == 5
-
-
-@pytest.mark.parametrize("count", [1, 63, 64, 65, 4096, 4097, 300_000])
-def test_sums_of_all_before(device, count):
-    values = np.random.default_rng(count).integers(0, 50, count).astype(np.uint32)
-    with device.current() as context:
-        built = LightGridPass(context, device.shaders)
-        buffer = context.buffer(values.tobytes())
-        built._sum_up(buffer, count)
-        found = np.frombuffer(buffer.read(), np.uint32)
-    assert np.array_equal(found, np.concatenate(([0], np.cumsum(values[:-1]))))

@@ -20,13 +20,14 @@ from ...core.block_masks import SIDE
 from ...core.errors import DeviceError
 from ...core.progress import Progress, silent, step
 from ...core.scene import Float32
+from ..buffer_pool import BufferPool
 from ..gpu_layout import HALF_BALL
+from ..prefix_sum import INVOCATIONS, PrefixSum, run_for_each
 from ..shader_library import ShaderLibrary, set_uniforms
 
 if TYPE_CHECKING:
     import moderngl
 
-GROUP_SIZE = 64
 # Blocks along each axis of the next larger block.
 BRANCHING = 4
 # Invocations that keep a large device busy: long lists of few blocks are shared among several.
@@ -37,8 +38,6 @@ MOST_LIGHTS_PER_PART = 1 << 15
 MOST_MASKS_PER_PART = 1 << 9
 # Invocations in one dispatch, so that a software renderer hears of a cancellation.
 INVOCATIONS_PER_DISPATCH = 1 << 18
-MAX_GROUPS_PER_AXIS = 65535
-VALUES_PER_RUN = 64
 
 _BINDINGS = (
     "HALF_BALL_BINDING",
@@ -50,11 +49,8 @@ _BINDINGS = (
     "MASK_BINDING",
 )
 _DEFINES = {name: binding for binding, name in enumerate(_BINDINGS)} | {
-    "VALUE_BINDING": 0,
-    "RUN_SUM_BINDING": 1,
-    "GROUP_SIZE": GROUP_SIZE,
+    "GROUP_SIZE": INVOCATIONS,
     "BRANCHING": BRANCHING,
-    "RUN": VALUES_PER_RUN,
 }
 
 
@@ -126,10 +122,7 @@ class LightGridPass:
             for masks in (False, True)
             for fill in (False, True)
         }
-        self._sum = {
-            spread: shaders.compute("passes/light_grid_sum.comp", {**_DEFINES, "SPREAD": spread})
-            for spread in (False, True)
-        }
+        self._sum = PrefixSum(context, shaders, BufferPool(context))
         self._block_limit = int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
 
     def build(self, half_balls: HalfBalls, edges: Float32, progress: Progress = silent) -> GpuBlockLists:
@@ -152,7 +145,7 @@ class LightGridPass:
             parts = _parts(per_axis**3, longest, MOST_MASKS_PER_PART if side == SIDE else MOST_LIGHTS_PER_PART)
             children = _Blocks(side, per_axis, parts, self._buffer(4 * (per_axis**3 * parts + 1)))
             self._run(inputs, children, blocks, lights, None, None, progress)
-            self._sum_up(children.positions, children.slots + 1)
+            self._sum.run(children.positions, children.slots + 1)
             offsets = children.offsets()
             total, longest = int(offsets[-1]), int(np.diff(offsets.astype(np.int64)).max())
             masks = self._buffer(8 * total) if side == SIDE else None
@@ -189,29 +182,8 @@ class LightGridPass:
         for start in range(0, blocks.slots, INVOCATIONS_PER_DISPATCH):
             stop = min(start + INVOCATIONS_PER_DISPATCH, blocks.slots)
             set_uniforms(shader, {**values, "first": start, "end": stop})
-            self._dispatch(shader, stop - start)
+            run_for_each(self._context, shader, stop - start)
             step(progress, stop / blocks.slots, "light grid")
-
-    def _sum_up(self, values: moderngl.Buffer, count: int) -> None:
-        """Replaces each of `count` values by the sum of those before it."""
-        runs = -(-count // VALUES_PER_RUN)
-        run_sums = self._uploaded(np.zeros(runs))
-        if runs > 1:
-            self._sum_runs(False, values, run_sums, count)
-            self._sum_up(run_sums, runs)
-        self._sum_runs(True, values, run_sums, count)
-
-    def _sum_runs(self, spread: bool, values: moderngl.Buffer, run_sums: moderngl.Buffer, count: int) -> None:
-        values.bind_to_storage_buffer(_DEFINES["VALUE_BINDING"])
-        run_sums.bind_to_storage_buffer(_DEFINES["RUN_SUM_BINDING"])
-        set_uniforms(self._sum[spread], {"count": count})
-        self._dispatch(self._sum[spread], -(-count // VALUES_PER_RUN))
-
-    def _dispatch(self, shader: moderngl.ComputeShader, invocations: int) -> None:
-        groups = -(-invocations // GROUP_SIZE)
-        wide = min(groups, MAX_GROUPS_PER_AXIS)
-        shader.run(wide, -(-groups // wide))
-        self._context.memory_barrier()
 
     def _buffer(self, size: int) -> moderngl.Buffer:
         """A buffer of `size` bytes, or of a few where that is 0."""
