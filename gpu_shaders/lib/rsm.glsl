@@ -36,23 +36,30 @@ float covering_radius(vec2 place) {
     return length(max(place, 1.0 - place));
 }
 
-// Unit direction to a place in the equal-area picture of the sphere around `axis` (Lambert's azimuthal projection), in
-// which the whole sphere is the unit disc. disc: within it.
-vec3 around_axis(vec3 axis, vec2 disc) {
-    float squared = min(dot(disc, disc), 1.0);
-    // Duff et al. 2017: an orthonormal basis of a vector.
+// Columns x, y, z of a frame whose z is `axis`, unit (Duff et al. 2017).
+mat3 frame_of(vec3 axis) {
     float side = axis.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (side + axis.z);
     float b = axis.x * axis.y * a;
     vec3 tangent = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x);
-    vec3 bitangent = vec3(b, side + axis.y * axis.y * a, -axis.y);
-    return (1.0 - 2.0 * squared) * axis + 2.0 * sqrt(1.0 - squared) * (disc.x * tangent + disc.y * bitangent);
+    return mat3(tangent, vec3(b, side + axis.y * axis.y * a, -axis.y), axis);
 }
 
-// Texel of the map of a cube, `side` texels a face, that shows a direction from the lamp.
-ivec2 cube_texel(Lamp lamp, vec3 direction, int side) {
-    lamp.shadow_origin = vec3(0.0);
+// Unit direction to a place in the equal-area picture of the sphere around the frame's z (Lambert's azimuthal
+// projection), in which the whole sphere is the unit disc. disc: within it.
+vec3 sphere_direction(mat3 frame, vec2 disc) {
+    float squared = min(dot(disc, disc), 1.0);
+    return frame * vec3(2.0 * sqrt(1.0 - squared) * disc, 1.0 - 2.0 * squared);
+}
+
+// Texel of the map of a cube, `side` texels a face, that shows a direction from the lamp, in the lamp's own frame.
+ivec2 cube_texel(vec3 direction, int side) {
+    Lamp lamp;
     lamp.shadow_kind = SHADOW_CUBE;
+    lamp.shadow_origin = vec3(0.0);
+    lamp.x_axis = vec3(1.0, 0.0, 0.0);
+    lamp.y_axis = vec3(0.0, 1.0, 0.0);
+    lamp.z_axis = vec3(0.0, 0.0, 1.0);
     ShadowPoint place = shadow_point(lamp, direction, vec3(0.0));
     vec2 uv = place.position.xy / place.position.z * 0.5 + 0.5;
     return ivec2(place.tile) * side + clamp(ivec2(uv * float(side)), ivec2(0), ivec2(side - 1));

@@ -2,9 +2,9 @@
 """Light of virtual point lights: small lit pieces of surface that send their flux on by Lambert's law.
 
 The oracle of lib/vpl.glsl. With flux P (W) on a piece of A (m²), distance d and the cosines c at the receiver and c'
-at the light, irradiance is P c c' / (pi d²). That grows without bound where surfaces meet, because the piece is taken for a
-point. P c c' / (pi d² + A) does not: it is what a disk of that area sends to a point on its axis, never exceeds the
-piece's own radiosity P / A, and is the same from far away.
+at the light, irradiance is P c c' / (pi d²). That grows without bound where surfaces meet, because the piece is taken
+for a point. P c c' / (pi d² + A) does not: it is what a disk of that area sends to a point on its axis, never exceeds
+the piece's own radiosity P / A, and is the same from far away.
 """
 
 from __future__ import annotations

@@ -29,6 +29,8 @@ LEAST_FACE = 8
 MIP_GROUP_SIDE = 8
 CACHE_BYTES = 1 << 29
 """Of maps that are kept for all pictures of a frame; those beyond are drawn for each."""
+BYTES_PER_TEXEL = 54
+"""Three images of 16 bytes, a third more for the mip levels of one."""
 CHANNELS = 3
 
 
@@ -212,20 +214,32 @@ class LampReflections:
         """Maps drawn so far."""
         return self._pass.drawn
 
+    def draw(self) -> None:
+        """Draws the maps that are kept."""
+        for index in range(len(self._sources)):
+            if not self._keep(index):
+                return
+
     def maps(self) -> Iterator[ReflectiveShadowMap]:
         """Every map of every lamp that shines; each is valid until the next."""
         for index, (light, sample, count) in enumerate(self._sources):
-            if index in self._kept:
+            if self._keep(index):
                 yield self._kept[index]
                 continue
             size = self._pass.size(light)
-            # Three images of 16 bytes a texel, a third more for the mip levels of one.
-            needed = size[0] * size[1] * 54
-            if self._kept_bytes + needed <= CACHE_BYTES:
-                self._kept[index] = self._pass.render(self._geometry, light, sample, count)
-                self._kept_bytes += needed
-                yield self._kept[index]
-                continue
             if size not in self._shared:
                 self._shared[size] = self._pass.new_textures(light)
             yield self._pass.render(self._geometry, light, sample, count, self._shared[size])
+
+    def _keep(self, index: int) -> bool:
+        """Whether the map is, or now was drawn to be, among those that are kept."""
+        if index in self._kept:
+            return True
+        light, sample, count = self._sources[index]
+        width, height = self._pass.size(light)
+        needed = width * height * BYTES_PER_TEXEL
+        if self._kept_bytes + needed > CACHE_BYTES:
+            return False
+        self._kept[index] = self._pass.render(self._geometry, light, sample, count)
+        self._kept_bytes += needed
+        return True
