@@ -117,18 +117,24 @@ def row(
     return (
         f"{lights:,}, {cells}³",
         f"{part}",
-        f"{1e-3 * part * brute.wall:,.2f}",
-        f"{1e-3 * shaders.wall:,.2f}",
+        seconds(part * brute.wall),
+        seconds(shaders.wall),
         f"{part * brute.wall / shaders.wall:,.0f}",
         f"{part * brute.processor / shaders.processor:,.0f}",
-        f"{1e-3 * numpy_path.wall:,.2f}",
+        seconds(numpy_path.wall),
         f"{counts.mean():.1f}",
         f"{fullest:,}",
         f"{1e-6 * lists.nbytes:.1f}",
         f"{1e-6 * fixed:.1f}",
         f"{fixed / lists.nbytes:.1f}",
-        f"{1e-3 * thesis_ms:,.2f}" if thesis_ms else "",
+        seconds(thesis_ms) if thesis_ms else "",
     )
+
+
+def seconds(milliseconds: float) -> str:
+    """With three digits or up to the whole second."""
+    value = 1e-3 * milliseconds
+    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def timed(device: Device, work: Callable[[], Any]) -> Timed:

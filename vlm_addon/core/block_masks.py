@@ -89,12 +89,17 @@ class BlockTests:
         result = self._sums(NEAR_HEIGHT, rows) >= 0.0
         result |= self._sums(FAR, rows) <= radii_squared
         result &= reached
-        z, y, x, pairs = np.nonzero(reached & ~result)
-        cells = np.minimum(SIDE * places[:, pairs] + np.stack((x, y, z)), self._edges.shape[1] - 2)
+        doubtful = np.flatnonzero(reached & ~result)
+        bits, pairs = np.divmod(doubtful, len(members))
+        offsets = np.stack((bits % SIDE, bits // SIDE % SIDE, bits // SIDE**2))
+        cells = np.minimum(SIDE * np.take(places, pairs, axis=1) + offsets, self._edges.shape[1] - 2)
         half_balls = self._half_balls.take(members[pairs])
-        axes = np.arange(3)[:, None]
-        low, high = (self._edges[axes, cells + end] - half_balls.centres for end in (0, 1))
-        result[z, y, x, pairs] = plane_overlaps(half_balls, low, high)
+        low, high = (
+            np.stack([np.take(faces, along + end) for faces, along in zip(self._edges, cells, strict=True)])
+            - half_balls.centres
+            for end in (0, 1)
+        )
+        result.reshape(-1)[doubtful] = plane_overlaps(half_balls, low, high)
         return result
 
     def _sums(self, term: int, rows: Ints) -> Floats:
