@@ -8,11 +8,13 @@ import pytest
 
 from tests.form_factor_cases import room, unit
 from tests.render.rooms import lights_from_triangles
-from vlm_addon.core.form_factor import polygon_form_factor
+from vlm_addon.core.form_factor import paired_form_factor, polygon_form_factor
 from vlm_addon.core.light_clusters import cluster_irradiance, light_clusters
 from vlm_addon.core.light_cut import cut_irradiance, light_cut
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
 from vlm_addon.core.light_tree import ROOT, LightTree, build_light_tree
+from vlm_addon.core.light_tree_bounds import facing_height, horizon_height
+from vlm_addon.core.light_tree_error import tree_errors
 from vlm_addon.core.scene import Float64
 
 
@@ -101,6 +103,106 @@ def test_weights_along_every_line_to_the_root_add_up_to_one(lights: VirtualLight
         np.testing.assert_allclose(total, 1.0, atol=1e-12)
 
 
+def test_bounds_hold_for_every_light(lights: VirtualLightMesh, tree: LightTree) -> None:
+    """No light is higher over a point's horizon, and no point higher over a light, than the cluster's bounds say."""
+    random = np.random.default_rng(5)
+    points, normals = random.uniform(-0.5, 1.5, (40, 3)), unit(random.normal(size=(40, 3)))
+    facing = unit(lights.area_vectors)
+    for light in range(0, len(lights), 97):
+        over_light = ((points - lights.corners[light, 0]) * facing[light]).sum(axis=1)
+        over_ground = np.einsum("nkc,nc->nk", lights.corners[light] - points[:, None], normals).max(axis=1)
+        for cluster in chain(tree, light):
+            shapes = tree.shapes.take(np.full(40, cluster))
+            assert (over_light <= facing_height(shapes, points) + 1e-12).all()
+            assert (over_ground <= horizon_height(shapes, points, normals) + 1e-12).all()
+
+
+def test_bounds_are_nested(tree: LightTree) -> None:
+    """What gives a point nothing holds only what gives it nothing."""
+    random = np.random.default_rng(6)
+    inner = np.flatnonzero(tree.parent != ROOT)
+    for _ in range(20):
+        points = np.tile(random.uniform(-0.5, 1.5, 3), (len(tree), 1))
+        normals = np.tile(unit(random.normal(size=3)), (len(tree), 1))
+        for heights in (facing_height(tree.shapes, points), horizon_height(tree.shapes, points, normals)):
+            assert (heights[inner] <= heights[tree.parent[inner]] + 1e-12).all()
+
+
+@pytest.mark.parametrize("radiosity_of", [smooth_radiosity, patch_radiosity])
+def test_what_is_left_out_gives_nothing(lights: VirtualLightMesh, tree: LightTree, radiosity_of: object) -> None:
+    """Every pair that has a weight, whichever way it faces, adds up to the same to the last bits."""
+    radiosity = radiosity_of(lights)  # type: ignore[operator]
+    clusters = light_clusters(tree, lights, radiosity, 0.05)
+    points, normals = surface_points(lights, 60)
+    normals[::3] = unit(np.random.default_rng(1).normal(size=(20, 3)))
+    found = cut_irradiance(tree, clusters, lights, radiosity, points, normals, np.zeros(60, np.int32))
+    cut = light_cut(tree, clusters.window, points)
+    every = np.zeros((60, 3))
+    factors = paired_form_factor(points[cut.light_points], normals[cut.light_points], lights.corners[cut.lights])
+    np.add.at(every, cut.light_points, (cut.light_weights * factors)[:, None] * radiosity[cut.lights])
+    at, of = cut.cluster_points, cut.clusters
+    irradiance = cut.cluster_weights * cluster_irradiance(tree, clusters, of, points[at], normals[at])
+    np.add.at(every, at, irradiance[:, None] * clusters.colour[of])
+    np.testing.assert_allclose(found.irradiance, every, atol=1e-15 * len(lights), rtol=0.0)
+    assert (found.evaluated <= found.visited).all()
+    assert found.visited.sum() < 0.7 * len(cut.lights) + len(cut.clusters)
+
+
+def test_chosen_lights_and_the_others_are_the_whole(lights: VirtualLightMesh) -> None:
+    chosen = np.arange(len(lights)) % 3 == 0
+    radiosity = smooth_radiosity(lights)
+    points, normals = surface_points(lights, 40)
+    found = np.zeros((40, 3))
+    for part in (chosen, ~chosen):
+        tree = build_light_tree(lights, part)
+        assert sum(count for _, count, _ in tree.occupancy) == part.sum()
+        assert (tree.light_parent[~part] == ROOT).all()
+        clusters = light_clusters(tree, lights, radiosity, 0.02)
+        found += cut_irradiance(tree, clusters, lights, radiosity, points, normals, np.zeros(40, np.int32)).irradiance
+    full = polygon_form_factor(points, normals, lights.corners) @ radiosity
+    assert np.abs(found - full).max() < 0.06 * full.max()
+
+
+def test_children_are_listed_in_order(lights: VirtualLightMesh, tree: LightTree) -> None:
+    for cluster in range(0, len(tree), 53):
+        children = np.arange(tree.child_offsets[cluster], tree.child_offsets[cluster + 1])
+        members = tree.light_order[tree.light_offsets[cluster] : tree.light_offsets[cluster + 1]]
+        np.testing.assert_array_equal(children, np.flatnonzero(tree.parent == cluster))
+        np.testing.assert_array_equal(np.sort(members), np.flatnonzero(tree.light_parent == cluster))
+    assert len(tree.light_order) == len(lights)
+    assert sum(clusters for _, _, clusters in tree.occupancy) == len(tree)
+
+
+def test_memory_is_a_part_of_what_is_allowed(lights: VirtualLightMesh, tree: LightTree) -> None:
+    """30 MB for 100,000 lights."""
+    clusters = light_clusters(tree, lights, smooth_radiosity(lights), 0.02)
+    assert tree.nbytes + clusters.nbytes < 300 * len(lights)
+
+
+def test_relighting_changes_steadily(lights: VirtualLightMesh, tree: LightTree) -> None:
+    radiosity = smooth_radiosity(lights)
+    nudged = radiosity * (1.0 + 1e-7 * np.sin(np.arange(len(lights))))[:, None]
+    before, after = (light_clusters(tree, lights, values, 0.02) for values in (radiosity, nudged))
+    for name in ("power", "mean", "axes", "flux", "window", "colour"):
+        np.testing.assert_allclose(getattr(after, name), getattr(before, name), rtol=1e-5, atol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("lamp", [False, True])
+@pytest.mark.parametrize("tolerance", [0.01, 0.02, 0.1])
+def test_a_plain_box_stays_within_the_tolerance(tolerance: float, lamp: bool) -> None:
+    """Like walls err alike, so that errors do not cancel."""
+    box = lights_from_triangles(0.5 + 1.02 * (room(20) - 0.5))
+    centroids = box.corners.mean(axis=1)
+    radiosity = np.repeat(1.0 + 0.5 * np.sin(7.0 * centroids.sum(axis=1, keepdims=True)), 3, axis=1)
+    if lamp:
+        radiosity[np.linalg.norm(centroids - (0.0, 0.6, 0.4), axis=1) > 0.25] = 0.0
+    points, normals = surface_points(lights_from_triangles(room(1)), 200)
+    tree = build_light_tree(box)
+    structure = tree, light_clusters(tree, box, radiosity, tolerance)
+    errors = tree_errors([structure], box, radiosity, points, normals, np.zeros(200, np.int32))
+    assert errors.within(tolerance)
+
+
 @pytest.mark.parametrize("radiosity_of", [smooth_radiosity, patch_radiosity])
 @pytest.mark.parametrize("tolerance", [0.01, 0.3])
 def test_windows_are_nested(lights: VirtualLightMesh, tree: LightTree, tolerance: float, radiosity_of: object) -> None:
@@ -113,14 +215,25 @@ def test_windows_are_nested(lights: VirtualLightMesh, tree: LightTree, tolerance
     assert (window[outer] >= window[inner] + apart).all()
 
 
+@pytest.fixture(scope="module")
+def factors(lights: VirtualLightMesh) -> tuple[Float64, Float64, Float64]:
+    """Points and normals, and the form factors of all lights there."""
+    points, normals = surface_points(lights, 120)
+    return points, normals, polygon_form_factor(points, normals, lights.corners)
+
+
 @pytest.mark.parametrize("radiosity_of", [smooth_radiosity, patch_radiosity])
 @pytest.mark.parametrize("tolerance", [0.01, 0.02, 0.05, 0.1])
 def test_error_stays_within_the_tolerance(
-    lights: VirtualLightMesh, tree: LightTree, tolerance: float, radiosity_of: object
+    lights: VirtualLightMesh,
+    tree: LightTree,
+    tolerance: float,
+    radiosity_of: object,
+    factors: tuple[Float64, Float64, Float64],
 ) -> None:
     radiosity = radiosity_of(lights)  # type: ignore[operator]
-    points, normals = surface_points(lights, 120)
-    full = polygon_form_factor(points, normals, lights.corners) @ radiosity
+    points, normals, shares = factors
+    full = shares @ radiosity
     clusters = light_clusters(tree, lights, radiosity, tolerance)
     tags = np.zeros(len(points), np.int32)
     found = cut_irradiance(tree, clusters, lights, radiosity, points, normals, tags).irradiance

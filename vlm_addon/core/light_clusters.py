@@ -58,6 +58,11 @@ class LightClusters:
     window: Float64
     least_squared: Float64
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in vars(self).values())
+
 
 def light_clusters(
     tree: LightTree,
@@ -92,7 +97,7 @@ def light_clusters(
         normal_spread=lit[:, None, None] * symmetric(sums[13:19]) - np.einsum("ci,cj->cij", flux, flux),
         colour=sums[20:].T / lit[:, None],
         # A quarter of the disc that has the power at the mean radiosity of the lights, each by its power.
-        least_squared=lit * lit / (4.0 * np.pi * np.maximum(sums[19], np.finfo(float).tiny)),
+        least_squared=power * power / (4.0 * np.pi * np.maximum(sums[19], np.finfo(float).tiny)),
         window=_windows(tree, lit, flux, axes, tolerance * mean_irradiance),
     )
 
@@ -123,10 +128,10 @@ def cluster_irradiance(
     shapes = tree.shapes.take(rows)
     highest = np.maximum(horizon_height(shapes, points, normals), 0.0)
     facing = np.maximum(facing_height(shapes, points), 0.0)
-    result = np.zeros(len(rows))
+    result, smallest = np.zeros(len(rows)), float(np.sqrt(np.finfo(float).tiny))
     for k in range(4):
         towards = mean + offsets[:, k] - points
-        squared = np.maximum((towards * towards).sum(-1), clusters.least_squared[rows])
+        squared = np.maximum((towards * towards).sum(-1), np.maximum(clusters.least_squared[rows], smallest))
         emitted = -(towards * flux).sum(-1)
         deviation = np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", towards, spread, towards), 0.0))
         received = np.clip((towards * normals).sum(-1), 0.0, highest)

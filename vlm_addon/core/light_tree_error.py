@@ -24,7 +24,7 @@ DIM_SHARE = 0.1
 _PAIRS_PER_BLOCK = 1 << 20
 _POINTS_PER_BLOCK = 256
 _ROUNDING = 1e-9
-_FAR_RADII = 8.0
+_FAR_RADII = 4.0
 
 
 @dataclass(frozen=True)
