@@ -22,7 +22,7 @@ from ..core.light_mesh import VirtualLightMesh
 from ..core.light_tree import build_light_tree
 from ..core.progress import Progress
 from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
-from ..core.scene import Float32, SceneSnapshot
+from ..core.scene import Float32, Float64, SceneSnapshot
 from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
 from .passes.phase_two_range import GpuRangeGrid
 from .shader_library import ShaderLibrary
@@ -34,6 +34,11 @@ T = TypeVar("T")
 Bools = npt.NDArray[np.bool_]
 
 STATIC, DYNAMIC = "static", "dynamic"
+LEAST_SHARE = 0.1
+"""Of the lights' area in that of all surfaces: under an open sky, light that misses all of them is no reason to ask for
+more than a tenth of the error."""
+STEPS_PER_DOUBLING = 8
+"""Of the error that is allowed: it moves windows by some 4 % at most."""
 
 
 class LightStructures:
@@ -45,13 +50,16 @@ class LightStructures:
         self._kept: dict[str, tuple[str, Any]] = {}
         self.built: dict[str, int] = {}
 
-    def trees(self, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float) -> list[LitTree]:
+    def trees(
+        self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float
+    ) -> list[LitTree]:
         """Trees of the static and of the dynamic lights, without those of no lights, and what they send out.
 
-        light_mesh: in world space. radiosity: (n, 3) W/m².
+        snapshot, light_mesh: in world space. radiosity: (n, 3) W/m².
         """
         result = []
-        lit_by = content_hash([radiosity, tolerance])
+        values = radiosity.astype(np.float64)
+        mean, allowed = _allowed_error(snapshot, light_mesh, values, tolerance)
         for kind, chosen in chosen_lights(light_mesh).items():
             if not chosen.any():
                 continue
@@ -63,10 +71,11 @@ class LightStructures:
             tree = self.kept(f"{kind}_tree", shape, build)
 
             def relight(tree: Any = tree) -> LitTree:
-                return LitTree(tree, light_clusters(tree, light_mesh, radiosity.astype(np.float64), tolerance))
+                return LitTree(
+                    tree, light_clusters(tree, light_mesh, values, allowed / mean if mean > 0.0 else tolerance)
+                )
 
-            # The scale of all light comes into it, so lights that are not in the tree do, too.
-            state = f"{shape} {content_hash(light_mesh.areas)} {lit_by}"
+            state = content_hash([shape, radiosity[chosen], allowed])
             result.append(self.kept(f"{kind}_clusters", state, relight))
         return result
 
@@ -120,6 +129,32 @@ def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, Bools]:
 def shape_hash(light_mesh: VirtualLightMesh, chosen: Bools) -> str:
     """Hash of all that a structure over the `chosen` lights depends on."""
     return content_hash([chosen, light_mesh.corners[chosen], light_mesh.tag_ids[chosen]])
+
+
+def _allowed_error(
+    snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float
+) -> tuple[float, float]:
+    """Mean radiosity of the lights and the error that irradiance may have, both in W/m², sum over the channels.
+
+    The latter is `tolerance` times the mean irradiance of a closed room with the surfaces there are: light from a few
+    of them only is spread over all. Rounded down to a step, so that what changes a little changes nothing.
+    """
+    areas = light_mesh.areas
+    area, power = float(areas.sum()), float(areas @ radiosity.sum(axis=1))
+    if not power > 0.0:
+        return 0.0, 0.0
+    share = max(area / max(area, _visible_area(snapshot)), LEAST_SHARE)
+    steps = np.floor(STEPS_PER_DOUBLING * np.log2(tolerance * share * power / area))
+    return power / area, float(2.0 ** (steps / STEPS_PER_DOUBLING))
+
+
+def _visible_area(snapshot: SceneSnapshot) -> float:
+    """m² of all visible triangles."""
+    area = 0.0
+    for mesh in snapshot.meshes:
+        a, b, c = np.moveaxis(mesh.positions[mesh.triangles], 1, 0)
+        area += 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return area
 
 
 def _bounds(snapshot: SceneSnapshot, only_static: bool) -> Bounds:

@@ -73,7 +73,7 @@ class ClusteredSum(LightSum):
         assert scene.world_lights is not None
         with scene.timer.measure("relight"):
             values = read_radiosity(radiosity, lights.count)
-            trees = scene.structures.trees(scene.world_lights, values, tolerance)
+            trees = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
             self._forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
