@@ -46,18 +46,6 @@ class Occupancy:
         """(m,) int64: lights that some cell leaves out though they reach it, ascending."""
         return np.flatnonzero(self.cells_dropped_from)
 
-    def summary(self) -> str:
-        """One line for reports."""
-        mean = self.entries / self.cells
-        text = f"{self.cells:,} cells, {mean:.1f} lights in the mean, {self.fullest:,} lights reach the fullest"
-        if not self.dropped_entries:
-            return f"{text}, nothing dropped"
-        share = self.dropped_entries / (self.entries + self.dropped_entries)
-        return (
-            f"{text}, {len(self.overflowing_cells):,} cells overflow, {share:.1%} of all entries dropped,"
-            f" of {len(self.dropped_lights):,} lights"
-        )
-
 
 def limited(
     lists: BlockLists,
