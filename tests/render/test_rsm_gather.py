@@ -244,7 +244,7 @@ def test_light_switched_off_between_frames_leaves_nothing(device: Device) -> Non
 
 
 def test_maps_are_drawn_once_for_all_pictures_of_a_frame_and_counted(device: Device) -> None:
-    frame = rendered(device, empty_room([MIDDLE, LAMPS["area"]]), 4, soft_maps=3)
+    frame = rendered(device, empty_room([MIDDLE, LAMPS["area"]]), 4, area_maps=3)
     assert frame.counters["reflective_maps"] == frame.counters["reflective_maps_drawn"] == 4
     assert 0.0 < frame.counters["bound_removes_share"] < 0.2
     assert {"reflective shadow maps", "gather"} <= {name for name, _ in frame.timings}

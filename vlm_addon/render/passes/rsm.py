@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.lamps import is_soft, lamp_samples
-from ...core.scene import Float32, Float64, Light
+from ...core.lamps import LampSample, lamp_samples
+from ...core.scene import AREA, Float32, Float64, Light
 from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..geometry import GpuGeometry
@@ -87,12 +87,21 @@ class ReflectiveShadowMap:
             texture.use(unit)
 
 
+def map_points(light: Light, count: int) -> tuple[LampSample, ...]:
+    """The points of a lamp that have a map each: `count` over an AREA lamp, else the middle.
+
+    A round lamp sends out from its middle what it sends out, but for what its own size hides.
+    """
+    hard = light if light.kind == AREA else replace(light, radius=0.0, angle=0.0)
+    return lamp_samples(hard, count)
+
+
 class ReflectiveShadowMapPass:
     """Draws reflective shadow maps of lamps of every kind. drawn: maps so far."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
         """resolution: texels along a cube's face, taken to the nearest power of two; a map of one tile has twice as
-        many, soft lamps half."""
+        many, area lamps half."""
         self._context = context
         self._shaders = shaders
         most = int(context.info["GL_MAX_TEXTURE_SIZE"]) // 4
@@ -108,7 +117,7 @@ class ReflectiveShadowMapPass:
     def side(self, light: Light) -> int:
         """Texels along a face of the maps of `light`."""
         face = self._face if map_tiles(light) != (1, 1) else self._face * SINGLE_TILE_FACTOR
-        return max(face // SOFT_DIVISOR, LEAST_FACE) if is_soft(light) else face
+        return max(face // SOFT_DIVISOR, LEAST_FACE) if light.kind == AREA else face
 
     def size(self, light: Light) -> tuple[int, int]:
         """Width and height of the maps of `light`, texels."""
@@ -137,9 +146,9 @@ class ReflectiveShadowMapPass:
         textures: MapTextures | None = None,
     ) -> ReflectiveShadowMap:
         """The map of one of `sample_count` points of `light`, over which its light is shared, drawn over `textures` if
-        they are given. A lamp with hard shadows has one point."""
-        samples = lamp_samples(light, sample_count)
-        record = lamp_record(light, samples[sample_index % len(samples)], geometry.origin)
+        they are given. Lamps other than AREA have one point, in their middle."""
+        sample = map_points(light, sample_count)[sample_index]
+        record = lamp_record(light, sample, geometry.origin)
         target = textures or self.new_textures(light)
         side = self.side(light)
         target.framebuffer.clear()
@@ -191,16 +200,16 @@ class LampReflections:
         geometry: GpuGeometry,
         lights: Sequence[Light],
         resolution: int,
-        soft_maps: int,
+        area_maps: int,
     ) -> None:
-        """soft_maps: points of a soft lamp that have a map each."""
+        """area_maps: points of an AREA lamp that have a map each."""
         self._geometry = geometry
         self._pass = ReflectiveShadowMapPass(context, shaders, resolution)
         self._sources = [
-            (light, sample, soft_maps)
+            (light, sample, area_maps)
             for light in lights
             if max(light.power) > 0.0
-            for sample in range(soft_maps if is_soft(light) else 1)
+            for sample in range(len(map_points(light, area_maps)))
         ]
         self._kept: dict[int, ReflectiveShadowMap] = {}
         self._kept_bytes = 0

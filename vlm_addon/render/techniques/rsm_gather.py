@@ -58,8 +58,8 @@ class Settings:
     resolution: int = setting(
         256, "texels", 8, 2048, "Along a face of a lamp's map, to the nearest power of two", source="003, 6.2.2"
     )
-    soft_maps: int = setting(
-        4, "count", 1, 64, "Points of a soft or area lamp that have a map each", source="one map leaves errors near it"
+    area_maps: int = setting(
+        4, "count", 1, 64, "Points of an area lamp that have a map each; one in its middle is off near the lamp"
     )
 
 
@@ -159,7 +159,7 @@ class RsmGather(Technique):
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         self._maps = LampReflections(
-            scene.context, scene.shaders, scene.geometry, scene.snapshot.lights, settings.resolution, settings.soft_maps
+            scene.context, scene.shaders, scene.geometry, scene.snapshot.lights, settings.resolution, settings.area_maps
         )
         self._gather = GatherPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
         self._irradiance: moderngl.Texture | None = None
