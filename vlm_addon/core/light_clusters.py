@@ -27,13 +27,15 @@ SOFTNESS = math.sqrt(3.0)
 # Error of a cluster at a distance d, as a share of power / (pi d²), found on the atrium under smooth light and under
 # lamps that light from 20 to some hundreds of 100,000 lights (tests/core/test_light_cut_accuracy.py):
 # _SIZE_ERROR (radius / d)^4, because four points have the lights' mean and spread but not their shape;
-_SIZE_ERROR = 0.16
+_SIZE_ERROR = 0.12
 # _NORMAL_ERROR sqrt(1 - flux / power), because normals are not spread evenly;
 _NORMAL_ERROR = 0.42
 # _HORIZON_ERROR spread / d, which happens where a horizon cuts through: seldom, so not added to the others.
 _HORIZON_ERROR = 0.05
+# The clusters of a plain wall err alike, by _COMMON_ERROR (radius / d)^4 of what they give: at most the tolerance.
+_COMMON_ERROR = 0.05
 # Nearer than so many radii the four points are no longer like the lights.
-_NEAREST_RADII = 1.2
+_NEAREST_RADII = 1.0
 _DARK = 1e-20
 
 
@@ -98,7 +100,7 @@ def light_clusters(
         colour=sums[20:].T / lit[:, None],
         # A quarter of the disc that has the power at the mean radiosity of the lights, each by its power.
         least_squared=power * power / (4.0 * np.pi * np.maximum(sums[19], np.finfo(float).tiny)),
-        window=_windows(tree, lit, flux, axes, tolerance * mean_irradiance),
+        window=_windows(tree, lit, flux, axes, tolerance, tolerance * mean_irradiance),
     )
 
 
@@ -173,17 +175,21 @@ def cluster_error(tree: LightTree, clusters: LightClusters, rows: npt.NDArray[np
     return np.asarray(share * power / (np.pi * distances**2))
 
 
-def _windows(tree: LightTree, power: Float64, flux: Float64, axes: Float64, allowed: float) -> Float64:
+def _windows(
+    tree: LightTree, power: Float64, flux: Float64, axes: Float64, tolerance: float, allowed: float
+) -> Float64:
     """(c,) m: where a cluster's error falls to `allowed` (W/m²); that of two causes by the sum of their squares.
 
     Nested: a parent's window reaches a cluster's window and the distance between their centroids, so that the parent's
     weight is nowhere less than the cluster's.
     """
-    source = power / (np.pi * max(allowed, float(np.finfo(float).tiny)))
+    smallest = float(np.finfo(float).tiny)
+    source = power / (np.pi * max(allowed, smallest))
     by_size = np.cbrt(_SIZE_ERROR * source * tree.radius**4)
     window = np.sqrt(by_size + source * _normal_error(power, flux))
     window = np.maximum(window, np.cbrt(_HORIZON_ERROR * source * _spread(axes)))
-    window = np.maximum(window, _NEAREST_RADII * tree.radius)
+    radii = max(_NEAREST_RADII, (_COMMON_ERROR / max(tolerance, smallest)) ** 0.25)
+    window = np.maximum(window, radii * tree.radius)
     for part in tree.depths():
         outer = tree.parent[part]
         if outer[0] != ROOT:
