@@ -38,7 +38,7 @@ LEAST_SHARE = 0.1
 """Of the lights' area in that of all surfaces: under an open sky, light that misses all of them is no reason to ask for
 more than a tenth of the error."""
 STEPS_PER_DOUBLING = 8
-"""Of the error that is allowed: it moves windows by some 4 % at most."""
+"""Of the mean irradiance: one moves windows by some 4 % at most."""
 
 
 class LightStructures:
@@ -59,7 +59,7 @@ class LightStructures:
         """
         result = []
         values = radiosity.astype(np.float64)
-        mean, allowed = _allowed_error(snapshot, light_mesh, values, tolerance)
+        mean = _mean_irradiance(snapshot, light_mesh, values)
         for kind, chosen in chosen_lights(light_mesh).items():
             if not chosen.any():
                 continue
@@ -71,11 +71,9 @@ class LightStructures:
             tree = self.kept(f"{kind}_tree", shape, build)
 
             def relight(tree: Any = tree) -> LitTree:
-                return LitTree(
-                    tree, light_clusters(tree, light_mesh, values, allowed / mean if mean > 0.0 else tolerance)
-                )
+                return LitTree(tree, light_clusters(tree, light_mesh, values, tolerance, mean))
 
-            state = content_hash([shape, radiosity[chosen], allowed])
+            state = content_hash([shape, radiosity[chosen], tolerance, mean])
             result.append(self.kept(f"{kind}_clusters", state, relight))
         return result
 
@@ -131,21 +129,19 @@ def shape_hash(light_mesh: VirtualLightMesh, chosen: Bools) -> str:
     return content_hash([chosen, light_mesh.corners[chosen], light_mesh.tag_ids[chosen]])
 
 
-def _allowed_error(
-    snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float
-) -> tuple[float, float]:
-    """Mean radiosity of the lights and the error that irradiance may have, both in W/m², sum over the channels.
+def _mean_irradiance(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float64) -> float:
+    """W/m², sum over the channels: of a closed room with the surfaces there are.
 
-    The latter is `tolerance` times the mean irradiance of a closed room with the surfaces there are: light from a few
-    of them only is spread over all. Rounded down to a step, so that what changes a little changes nothing.
+    Light from a few of them only is spread over all. Rounded down to a step, so that what changes a little changes no
+    cluster.
     """
     areas = light_mesh.areas
-    area, power = float(areas.sum()), float(areas @ radiosity.sum(axis=1))
+    power = float(areas @ radiosity.sum(axis=1))
     if not power > 0.0:
-        return 0.0, 0.0
-    share = max(area / max(area, _visible_area(snapshot)), LEAST_SHARE)
-    steps = np.floor(STEPS_PER_DOUBLING * np.log2(tolerance * share * power / area))
-    return power / area, float(2.0 ** (steps / STEPS_PER_DOUBLING))
+        return 0.0
+    area = float(areas.sum())
+    mean = power / min(max(area, _visible_area(snapshot)), area / LEAST_SHARE)
+    return float(2.0 ** (np.floor(STEPS_PER_DOUBLING * np.log2(mean)) / STEPS_PER_DOUBLING))
 
 
 def _visible_area(snapshot: SceneSnapshot) -> float:
