@@ -15,17 +15,14 @@ import numpy.typing as npt
 import pytest
 
 from tests.render.closed_rooms import ROOM_REFLECTANCES, ROOM_SIZE, empty_room, inward_box, room_area, wall_points
+from tests.render.gathering import COLUMNS, gathered
 from tests.render.rooms import box_room, camera_at
 from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.lamps import lamp_irradiance
-from vlm_addon.core.progress import silent
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.geometry import GpuGeometry
-from vlm_addon.render.passes.gbuffer import GBuffer
-from vlm_addon.render.passes.rsm import LampReflections
-from vlm_addon.render.techniques.rsm_gather import SQUARED, UNBIASED, GatherPass, sample_taps
+from vlm_addon.render.techniques.rsm_gather import SQUARED, UNBIASED, sample_taps
 
 WATTS = (45.0, 45.0, 45.0)
 """Of the lamp in the sample scene empty_room, a point in its middle."""
@@ -37,42 +34,6 @@ LAMPS = {
     "area": Light("l", AREA, WATTS, (0.0, 0.0, 1.2), size_x=1.0, size_y=0.8),
 }
 MIDDLE = LAMPS["point in the middle"]
-COLUMNS = 64
-
-
-def picture_of(device: Device, points: Float64, normals: Float64) -> GBuffer:
-    """One surface point a pixel, COLUMNS of them in a row; within `device.current()`."""
-
-    def upload(values: np.ndarray, kind: str) -> object:
-        image = np.zeros((len(values) // COLUMNS, COLUMNS, 4), kind)
-        image[..., : values.shape[1]] = values.reshape(*image.shape[:2], -1)
-        size = image.shape[1::-1]
-        return device.context.texture(size, 4, image.tobytes(), dtype="i4" if kind == "<i4" else "f4")
-
-    position, normal = upload(points, "<f4"), upload(normals, "<f4")
-    ids = upload(np.zeros((len(points), 1)), "<i4")
-    return GBuffer(position, normal, normal, position, position, ids)  # type: ignore[arg-type]
-
-
-def gathered(
-    device: Device,
-    room: SceneSnapshot,
-    points: Float64,
-    normals: Float64,
-    samples: int,
-    weight: str = UNBIASED,
-    radius: float = 1.0,
-    pictures: int = 1,
-) -> Float64:
-    """(p, 4): irradiance, and what bounds took off, of one picture."""
-    with device.current() as context:
-        geometry = GpuGeometry(context, room, np.zeros(3))
-        maps = LampReflections(context, device.shaders, geometry, room.lights, 128, 4)
-        gather = GatherPass(context, device.shaders, COLUMNS, len(points) // COLUMNS)
-        gbuffer = picture_of(device, points, normals)
-        taps = sample_taps(samples, 0, weight)
-        found = gather.render(gbuffer, maps.maps(), len(maps), taps, pictures, radius, silent)
-        return np.frombuffer(found.read(), np.float32).reshape(-1, 4).astype(float)
 
 
 def reflected_power(light: Light) -> Float64:
