@@ -310,6 +310,31 @@ def test_no_lights_and_no_power_give_nothing() -> None:
     assert not cut.evaluated.any()
 
 
+def odd_lights() -> dict[str, Float64]:
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return {
+        "one": triangle[None],
+        "the same twice": np.stack([triangle, triangle]),
+        "a thousand in one place": np.tile(triangle, (1000, 1, 1)),
+        "without area": np.zeros((5, 3, 3)),
+        "dust beside a wall": np.concatenate([triangle[None], 1e-9 * np.tile(triangle, (50, 1, 1))]),
+        "far apart": np.stack([triangle, triangle + 1e9, triangle - 1e9]),
+        "back to back": np.stack([triangle, triangle[::-1]]),
+    }
+
+
+@pytest.mark.parametrize("name", odd_lights())
+def test_odd_light_meshes_are_met(name: str) -> None:
+    lights = lights_from_triangles(odd_lights()[name])
+    tree, radiosity = build_light_tree(lights), np.ones((len(lights), 3))
+    clusters = light_clusters(tree, lights, radiosity, 0.02)
+    points = np.array([[0.2, 0.2, 1e-3], [0.2, 0.2, -2.0], [0.3, 0.3, 5.0], [0.0, 0.0, 0.0]])
+    normals = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0]])
+    found = cut_irradiance(tree, clusters, lights, radiosity, points, normals, np.zeros(4, np.int32)).irradiance
+    full = polygon_form_factor(points, normals, lights.corners) @ radiosity
+    np.testing.assert_allclose(found, full, rtol=0.02, atol=0.02 * full.mean())
+
+
 @pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
 def test_scale_changes_nothing(scale: float) -> None:
     small = hall(6)
