@@ -84,7 +84,7 @@ def test_every_light_is_in_a_cluster_that_holds_it(lights: VirtualLightMesh, tre
 
 
 def test_sums_reach_the_roots(lights: VirtualLightMesh, tree: LightTree) -> None:
-    total = tree.sums(lights.areas[None])[0]
+    total = tree.sums(lights.areas[None, tree.light_order])[0]
     assert total[tree.roots].sum() == pytest.approx(lights.areas.sum(), rel=1e-12)
 
 

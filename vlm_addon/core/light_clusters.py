@@ -17,7 +17,15 @@ import numpy.typing as npt
 
 from .light_mesh import VirtualLightMesh
 from .light_tree import ROOT, LightTree
-from .light_tree_bounds import PAIRS, column_cross, facing_height, horizon_height, place_moments, symmetric
+from .light_tree_bounds import (
+    PAIRS,
+    column_cross,
+    facing_height,
+    horizon_height,
+    place_moments,
+    symmetric,
+    triangle_areas,
+)
 from .scene import Float64
 
 FADE = 0.2
@@ -78,19 +86,18 @@ def light_clusters(
     mean_irradiance: W/m², sum over the channels, over the surfaces that are to be lit; as the lights' own surfaces
     would receive in a closed room (power / area of all lights) where it is not given.
     """
+    if mean_irradiance is None:
+        mean_irradiance = _mean_radiosity(light_mesh, radiosity)
     # Near the lights, so that differences of squares keep their digits.
     origin = tree.centroid.mean(axis=0) if len(tree) else np.zeros(3)
-    areas, moments = _moments(light_mesh.corners - origin, radiosity)
-    sums = tree.sums(moments)
+    members = tree.light_order
+    sums = tree.sums(_moments(light_mesh.vertices[light_mesh.triangles[members]] - origin, radiosity[members]))
     power, flux, mean = sums[0], sums[1:4].T, sums[4:7].T
-    total_power, total_area = float(moments[0].sum()), float(areas.sum())
     # What gives less than this share of all light is met as if it gave so much.
-    lit = np.maximum(power, max(_DARK * total_power, float(np.finfo(float).tiny)))
+    lit = np.maximum(power, max(_DARK * float(power[tree.roots].sum()), float(np.finfo(float).tiny)))
     mean = np.where((power > 0.0)[:, None], mean / lit[:, None], tree.centroid - origin)
     spread = symmetric(sums[7:13] / lit) - np.einsum("ci,cj->cij", mean, mean)
     axes = _axes_along(spread, tree.plane_axes)
-    if mean_irradiance is None:
-        mean_irradiance = total_power / max(total_area, float(np.finfo(float).tiny))
     return LightClusters(
         power=power,
         mean=mean + origin,
@@ -104,8 +111,14 @@ def light_clusters(
     )
 
 
-def _moments(corners: Float64, radiosity: Float64) -> tuple[Float64, Float64]:
-    """(n,) areas and (23, n) what each light adds to its clusters, rows as light_clusters takes them apart."""
+def _mean_radiosity(light_mesh: VirtualLightMesh, radiosity: Float64) -> float:
+    """W/m², sum over the channels."""
+    areas = triangle_areas(light_mesh.corners)
+    return float(areas @ radiosity.sum(axis=1)) / max(float(areas.sum()), float(np.finfo(float).tiny))
+
+
+def _moments(corners: Float64, radiosity: Float64) -> Float64:
+    """(23, m) what each light adds to its clusters, rows as light_clusters takes them apart."""
     areas, places = place_moments(corners)
     a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
     normals = 0.5 * column_cross(b - a, c - a) / np.where(areas > 0.0, areas, 1.0)
@@ -114,7 +127,7 @@ def _moments(corners: Float64, radiosity: Float64) -> tuple[Float64, Float64]:
     total = coloured[0] + coloured[1] + coloured[2]
     power = total * areas
     weighted = (*normals, *places, *products, total)
-    return areas, np.stack([power, *(power * row for row in weighted), *(areas * row for row in coloured)])
+    return np.stack([power, *(power * row for row in weighted), *(areas * row for row in coloured)])
 
 
 def cluster_irradiance(

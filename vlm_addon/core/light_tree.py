@@ -102,13 +102,12 @@ class LightTree:
         edges = np.flatnonzero(np.diff(self.depth, prepend=-1, append=-1))
         return [slice(int(start), int(end)) for start, end in itertools.pairwise(edges)]
 
-    def sums(self, of_lights: Float64) -> Float64:
-        """(k, c) sums over the lights of each cluster; of_lights: (k, n)."""
-        inside = self.light_parent != ROOT
-        owner = self.light_parent[inside].astype(np.intp)
-        total = np.zeros((len(of_lights), len(self)))
-        for row, values in zip(total, of_lights, strict=True):
-            row += np.bincount(owner, values[inside], len(self))
+    def sums(self, of_members: Float64) -> Float64:
+        """(k, c) sums over the lights of each cluster; of_members: (k, m), of lights in the order of light_order."""
+        owner = np.repeat(np.arange(len(self)), np.diff(self.light_offsets))
+        total = np.zeros((len(of_members), len(self)))
+        for row, values in zip(total, of_members, strict=True):
+            row += np.bincount(owner, values, len(self))
         for part in self.depths():
             owner = self.parent[part].astype(np.intp)
             if len(owner) and owner[0] != ROOT:
@@ -160,7 +159,7 @@ def build_light_tree(light_mesh: VirtualLightMesh, chosen: Bools | None = None) 
 
 def _plane_axes(tree: LightTree, corners: Float64) -> Float64:
     """As in LightTree."""
-    areas, moments = place_moments(corners - tree.centroid.mean(axis=0))
+    areas, moments = place_moments(corners[tree.light_order] - tree.centroid.mean(axis=0))
     sums = tree.sums(areas * np.concatenate([np.ones((1, len(areas))), moments]))
     covariance = symmetric(sums[4:] / np.maximum(sums[0], np.finfo(float).tiny))
     mean = sums[1:4].T / np.maximum(sums[0], np.finfo(float).tiny)[:, None]

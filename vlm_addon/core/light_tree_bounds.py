@@ -175,11 +175,17 @@ def place_moments(corners: Float64) -> tuple[Float64, Float64]:
     Component by component: numpy is slow where the last axis is short.
     """
     a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
-    x, y, z = column_cross(b - a, c - a)
     centroids = (a + b + c) / 3.0
     arms = a - centroids, b - centroids, c - centroids
     products = [sum(arm[i] * arm[j] for arm in arms) / 12.0 + centroids[i] * centroids[j] for i, j in PAIRS]
-    return 0.5 * np.sqrt(x * x + y * y + z * z), np.stack([*centroids, *products])
+    return triangle_areas(corners), np.stack([*centroids, *products])
+
+
+def triangle_areas(corners: Float64) -> Float64:
+    """(n,) of (n, 3, 3)."""
+    a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    x, y, z = column_cross(b - a, c - a)
+    return np.asarray(0.5 * np.sqrt(x * x + y * y + z * z))
 
 
 def column_cross(u: Float64, v: Float64) -> Float64:
