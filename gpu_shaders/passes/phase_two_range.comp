@@ -37,17 +37,25 @@ vec3 light_at(uint i, int k) {
     return is_own ? vec3(0.0) : factor * radiosities[i].rgb;
 }
 
+// Looks for the next light of its own before it computes one, so that invocations that run in step compute together
+// though they find theirs at different places.
 vec3 sum_of_cell(vec3 place, int k) {
     uvec3 cell = cell_of(place, low, high, cells);
     uint block = block_of(cell, cells);
     uint start = list_offsets[block], stop = list_offsets[block + 1u];
     uint end = min(start + end_entry, stop);
     vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
-    for (uint i = min(start + first_entry, stop); i < end; ++i) {
-        if (has_cell(masks[i], cell)) {
-            batch_sum += light_at(entries[i], k);
+    uint i = min(start + first_entry, stop);
+    for (uint found = 1u; ; ++found) {
+        while (i < end && !has_cell(masks[i], cell)) {
+            ++i;
         }
-        if (i % BATCH == BATCH - 1u) {
+        if (i >= end) {
+            break;
+        }
+        batch_sum += light_at(entries[i], k);
+        ++i;
+        if (found % BATCH == 0u) {
             sum += batch_sum;
             batch_sum = vec3(0.0);
         }
@@ -55,15 +63,25 @@ vec3 sum_of_cell(vec3 place, int k) {
     return sum + batch_sum;
 }
 
+bool holds(HalfBall half_ball, vec3 place) {
+    // Exact for a point.
+    return may_overlap(half_ball, place - half_ball.centre, place - half_ball.centre);
+}
+
 vec3 sum_outside(vec3 place, int k) {
-    vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
     uint end = min(end_entry, light_count);
-    for (uint i = first_entry; i < end; ++i) {
-        // Exact for a point.
-        if (may_overlap(half_balls[i], place - half_balls[i].centre, place - half_balls[i].centre)) {
-            batch_sum += light_at(i, k);
+    vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
+    uint i = first_entry;
+    for (uint found = 1u; ; ++found) {
+        while (i < end && !holds(half_balls[i], place)) {
+            ++i;
         }
-        if (i % BATCH == BATCH - 1u) {
+        if (i >= end) {
+            break;
+        }
+        batch_sum += light_at(i, k);
+        ++i;
+        if (found % BATCH == 0u) {
             sum += batch_sum;
             batch_sum = vec3(0.0);
         }

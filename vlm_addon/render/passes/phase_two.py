@@ -77,9 +77,12 @@ def bind_lights(tiles: Tiles, lights: GpuVirtualLights, radiosity: moderngl.Buff
     radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
 
 
-def entry_runs(longest: int, pixels: int) -> Iterator[tuple[int, int]]:
-    """First and end of the runs in which `longest` lights are summed for so many pixels, one run a dispatch."""
+def entry_runs(longest: int, pixels: int, most: int = MAX_LIGHTS_PER_DISPATCH) -> Iterator[tuple[int, int]]:
+    """First and end of the runs in which `longest` lights are summed for so many pixels, one run a dispatch.
+
+    most: lights of a run.
+    """
     chunk = EVALUATIONS_PER_DISPATCH // max(pixels, 1)
-    chunk = min(max(chunk, MIN_LIGHTS_PER_DISPATCH), MAX_LIGHTS_PER_DISPATCH)
+    chunk = min(max(chunk, MIN_LIGHTS_PER_DISPATCH), most)
     for first in range(0, longest, chunk):
         yield first, min(first + chunk, longest)

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 _MASK_BINDING = 5
 _HALF_BALL_BINDING = 6
+# Software renderers run eight invocations in step, each of which may look for its next light in turn: so many rounds
+# for each of four pixels stay below Mesa's 65,535.
+_MOST_PER_RUN = 1024
 FACE_SLACK = 1e-5
 """How far outside a grid of side 1 a point counts as on its face: some hundred roundings of a position."""
 
@@ -85,7 +88,7 @@ class RangePhaseTwoPass:
             set_uniforms(self._shader, {**tiles.uniforms(), **_frame_uniforms(grid, space)})
             # Points outside look through all lights.
             most = grid.longest if _holds(grid.frame, bounds) else max(grid.longest, grid.light_count)
-            for first, end in entry_runs(most, width * height):
+            for first, end in entry_runs(most, width * height, _MOST_PER_RUN):
                 set_uniforms(self._shader, {"first_entry": first, "end_entry": end})
                 self._shader.run(*tiles.grid)
                 self._context.memory_barrier()
