@@ -292,3 +292,15 @@ def test_lights_all_in_one_place(device: Device) -> None:
     pixels, radiosity = Pixels(generator, (20, 20)), np.full((5000, 3), 1e-3, np.float32)
     found = clustered(device, pixels, lights, radiosity)
     assert found == pytest.approx(cut(pixels, lights, radiosity), rel=1e-3, abs=1e-4)
+
+
+def test_more_clusters_than_a_dispatch_holds(device: Device) -> None:
+    """6,000 tags of two lights each: as many clusters without a parent, in every tile's list."""
+    generator = np.random.default_rng(17)
+    centres = np.repeat(generator.uniform((-1.0, -1.0, 19.0), (1.0, 1.0, 21.0), (6000, 3)), 2, axis=0)[:, None]
+    corners = centres + generator.normal(0.0, 0.02, (12_000, 3, 3))
+    lights = lights_from_triangles(corners, tag_ids=np.repeat(np.arange(1, 6001), 2))
+    pixels, radiosity = Pixels(generator, (6, 6)), np.ones((12_000, 3), np.float32)
+    pixels.normals[..., 2] = np.abs(pixels.normals[..., 2])
+    found, exact = clustered(device, pixels, lights, radiosity), cut(pixels, lights, radiosity)
+    assert found == pytest.approx(exact, rel=1e-3, abs=1e-4 * exact.max())

@@ -11,7 +11,7 @@ from ..light_forest import GpuLightForest
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
-from .phase_two import PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
+from .phase_two import MAX_LIGHTS_PER_DISPATCH, PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
 from .tile_bounds import TILE_SIDE, TileBoundsPass, Tiles
 from .tile_walk import (
     LIGHT_NODE_BINDING,
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 LIGHT_CLUSTER_BINDING = 3
 LIGHT_WINDOW_BINDING = 6
+# As MAX_LIGHTS_PER_DISPATCH; a cluster takes four rounds more for each pixel, unless a compiler unrolls them.
+MAX_CLUSTERS_PER_DISPATCH = 2048
 _DEFINES = {
     **PHASE_TWO_DEFINES,
     "LISTED": True,
@@ -106,7 +108,8 @@ class ClusteredPhaseTwoPass:
             else:
                 forest.nodes.bind_to_storage_buffer(LIGHT_NODE_BINDING)
                 forest.clusters.bind_to_storage_buffer(LIGHT_CLUSTER_BINDING)
-            for first, end in entry_runs(lists.longest, len(lists.tiles) * TILE_SIDE**2):
+            most = MAX_LIGHTS_PER_DISPATCH if lists.of_lights else MAX_CLUSTERS_PER_DISPATCH
+            for first, end in entry_runs(lists.longest, len(lists.tiles) * TILE_SIDE**2, most):
                 set_uniforms(shader, {**tiles.uniforms(), "first_entry": first, "end_entry": end})
                 shader.run(len(lists.tiles))
                 self._context.memory_barrier()
