@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light gathered from reflective shadow maps against Cycles with one diffuse bounce: weights, numbers of samples, maps.
+
+Cycles knows what occludes indirect light and this does not: that is most of the error in scenes with things in them.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from benchmarks.support import open_sample, quiet
+from vlm_addon.blender.cycles_reference import render_reference
+from vlm_addon.core.metrics import relative_rmse
+from vlm_addon.render.device import Device
+from vlm_addon.render.frame_types import RenderSettings
+from vlm_addon.terminal import table
+
+SCENES = ("empty_room", "cornell_box", "monkey_box")
+SIZE_PX = 64
+PICTURES = 8
+REFERENCE_SAMPLES = 1024
+VARIANTS: dict[str, dict[str, object]] = {
+    "200 samples": {},
+    "50 samples": {"samples": 50},
+    "2,000 samples, 512 texels": {"samples": 2000, "resolution": 512},
+    "one map for an area lamp": {"area_maps": 1},
+    "squared weight": {"weight": "squared"},
+    "disc of 0.3": {"radius": 0.3},
+}
+
+
+def main() -> None:
+    """Prints a row for each scene (all, or those named as arguments) and variant, the light mesh as a comparison."""
+    rows = []
+    for scene in sys.argv[1:] or SCENES:
+        with quiet():
+            found = open_sample(scene)
+            reference = render_reference(SIZE_PX, SIZE_PX, 1, REFERENCE_SAMPLES)
+        truth = reference.images["indirect"]
+        runs = [(name, "rsm_gather", values) for name, values in VARIANTS.items()]
+        if found.light_mesh is not None:
+            runs.append(("virtual light mesh", "vlm", {}))
+        with Device() as device:
+            for name, technique, values in runs:
+                settings = RenderSettings(SIZE_PX, SIZE_PX, technique, values, PICTURES)
+                frame = device.render(found.snapshot, found.light_mesh, settings)
+                indirect = frame.images["indirect"]
+                removed = frame.counters.get("bound_removes_share")
+                rows.append(
+                    (
+                        scene,
+                        name,
+                        f"{relative_rmse(indirect, truth):.1%}",
+                        f"{indirect.mean() / truth.mean():.3f}",
+                        "" if removed is None else f"{removed:.1%}",
+                        f"{sum(ms for _, ms in frame.timings):.0f}",
+                    )
+                )
+        rows.append((scene, "noise of the reference", f"{reference.noise['indirect']:.1%}", "", "", ""))
+    print(table(("scene", "variant", "indirect error", "light", "bound takes", "ms"), rows))
+
+
+if __name__ == "__main__":
+    main()
