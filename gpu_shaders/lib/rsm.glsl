@@ -26,9 +26,8 @@ vec3 diffuse_reflectance(Surface surface, sampler3D albedo_table) {
 // Where p projects into a map of one tile, in [0, 1]²: the nearest place in the map where it lies beside it.
 vec2 map_place(Lamp lamp, vec3 p) {
     vec3 q = shadow_point(lamp, p, vec3(0.0)).position;
-    vec2 plane = lamp.shadow_kind == SHADOW_PARALLEL ? q.xy - lamp.shadow_centre
-        : q.xy / max(q.z, 1e-6 * (abs(q.x) + abs(q.y)) + 1e-30);
-    return clamp(plane / lamp.shadow_extent * 0.5 + 0.5, 0.0, 1.0);
+    vec2 plane = lamp.shadow_kind == SHADOW_PARALLEL ? q.xy : q.xy / max(q.z, 1e-6 * (abs(q.x) + abs(q.y)) + 1e-30);
+    return clamp((plane - lamp.shadow_centre) / lamp.shadow_extent * 0.5 + 0.5, 0.0, 1.0);
 }
 
 // Radius of the disc around `place` that covers all of a map of one tile.

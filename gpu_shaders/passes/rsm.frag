@@ -11,7 +11,7 @@ layout(std430, binding = RESULT_BINDING) buffer Brightest { uint brightest[3]; }
 layout(binding = ALBEDO_TABLE_UNIT) uniform sampler3D albedo_table;
 
 uniform ivec2 tile_corner;      // of the face in the map, texels
-uniform vec2 extent;            // of half the face at distance 1; for a sun in m
+uniform vec2 extent, centre;    // half the face and its middle, on the plane at distance 1; for a sun in m
 uniform float side;             // texels
 
 layout(location = 0) out vec4 out_position; // m, from the local origin; w: depth along the face's axis, m
@@ -23,7 +23,7 @@ void main() {
     Lamp lamp = lamps[0];
     bool is_sun = lamp.kind == LAMP_SUN;
     vec2 size = 2.0 * extent / side;
-    vec2 place = (vec2(texel) + 0.5) * size - extent;
+    vec2 place = (vec2(texel) + 0.5) * size - extent + centre;
     float measure = is_sun ? size.x * size.y : piece_solid_angle(place, size);
     out_flux = vec4(0.0, 0.0, 0.0, lamp.shadow_kind == SHADOW_CUBE ? measure : 1.0 / (side * side));
     out_position = out_normal = vec4(0.0);

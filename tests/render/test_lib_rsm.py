@@ -91,7 +91,7 @@ def test_place_in_a_parallel_map(device: Device) -> None:
 def test_place_in_a_cones_map_and_beside_and_behind_it(device: Device) -> None:
     random = np.random.default_rng(3)
     uv = random.uniform(-0.4, 1.4, (200, 2))
-    plane = (2.0 * uv - 1.0) * EXTENT
+    plane = (2.0 * uv - 1.0) * EXTENT + CENTRE
     depth = random.uniform(0.1, 5.0, (200, 1))
     points = ORIGIN + np.concatenate([plane * depth, -depth], axis=1) @ AXES
     inputs = lamp_inputs("SHADOW_CONE", 200) | {"p": points}

@@ -256,6 +256,59 @@ def test_far_from_the_origin_and_large_it_is_the_same_light(device: Device) -> N
     )
 
 
+@pytest.mark.parametrize(
+    ("lamp", "distance"),
+    [(lamp, distance) for lamp in ("point", "spot") for distance in (5.0, 100.0, 1e5)]
+    # Float32 knows no narrower cone from farther away.
+    + [("narrow spot", 5.0), ("narrow spot", 100.0)],
+)
+def test_distant_lamps_see_the_scene_as_sharply_as_near_ones(device: Device, lamp: str, distance: float) -> None:
+    """A floor of 4 m x 2 m; the narrow spot lights a part of it."""
+    floor = quad((-2.0, -1.0, 0.0), (4.0, 0.0, 0.0), (0.0, 2.0, 0.0), material=0)
+    place = (0.3 * distance, 0.1 * distance, distance)
+    backward = np.array(place) / np.linalg.norm(place)
+    x_axis = np.cross((0.0, 1.0, 0.0), backward)
+    x_axis /= np.linalg.norm(x_axis)
+    axes = {"x_axis": tuple(x_axis), "y_axis": tuple(np.cross(backward, x_axis)), "z_axis": tuple(backward)}
+    angle = 1.0 if lamp == "spot" else 2.0 * math.atan(1.0 / np.linalg.norm(place))
+    kind = POINT if lamp == "point" else SPOT
+    light = Light("l", kind, tuple(np.array(POWER) * distance**2), place, **axes, spot_angle=angle, spot_blend=0.3)
+    snapshot = SceneSnapshot("s", (floor,), (Material("floor", DIFFUSE, (0.5, 0.5, 0.5)),), lights=(light,))
+    x, y = np.meshgrid((np.arange(800) + 0.5) / 200 - 2.0, (np.arange(400) + 0.5) / 200 - 1.0)
+    points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    received = lamp_irradiance(light, points, np.tile([0.0, 0.0, 1.0], (len(points), 1))).mean(axis=0) * 8.0
+    np.testing.assert_allclose(total_flux(device, snapshot), 0.5 * received, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        Light("l", AREA, POWER, PLACE, size_x=0.0, size_y=0.0),
+        Light("l", AREA, POWER, PLACE, size_x=1e-6, size_y=1e-6),
+        Light("l", SPOT, POWER, PLACE, spot_angle=math.pi, spot_blend=0.0),
+        Light("l", SPOT, POWER, PLACE, spot_angle=1e-6, spot_blend=1.0),
+        Light("l", SPOT, POWER, PLACE, spot_angle=1.0, spot_scale=(0.0, 1.0)),
+        Light("l", POINT, POWER, (2.0, 1.5, 1.25)),
+        Light("l", POINT, POWER, (0.0, 0.0, -1.25)),
+        Light("l", POINT, POWER, PLACE, radius=50.0),
+        Light("l", SUN, POWER, PLACE, angle=math.pi),
+        Light("l", SUN, POWER, PLACE, x_axis=(0.0, 0.0, -1.0), z_axis=(1.0, 0.0, 0.0)),
+    ],
+    ids=["no area", "tiny", "half space", "no cone", "flat cone", "in a corner", "in a wall", "huge", "dome", "level"],
+)
+def test_extreme_lamps_give_finite_flux_and_no_more_than_they_send(device: Device, light: Light) -> None:
+    room = empty_room([light], GREY)
+    with device.current() as context:
+        geometry = GpuGeometry(context, room)
+        for found in LampReflections(context, device.shaders, geometry, room.lights, RESOLUTION, 4).maps():
+            for texture in (found.position, found.normal, found.flux):
+                assert np.isfinite(texels(texture)).all()
+            assert (found.flux_level(0) >= 0.0).all()
+            assert np.isfinite(found.brightest).all()
+    if light.kind != SUN:
+        assert (total_flux(device, room, 4) <= 1.01 * np.array(GREY[0]) * POWER).all()
+
+
 def test_through_alpha_a_share_of_the_light_goes_on(device: Device) -> None:
     """A sun through a pane of alpha 0.25 before the floor."""
     sun = Light("l", SUN, POWER, (0.0, 0.0, 0.0))

@@ -114,22 +114,23 @@ class ReflectiveShadowMapPass:
         self._brightest = context.buffer(reserve=4 * CHANNELS)
         self.drawn = 0
 
-    def side(self, light: Light) -> int:
+    def side(self, geometry: GpuGeometry, light: Light) -> int:
         """Texels along a face of the maps of `light`."""
-        face = self._face if map_tiles(light) != (1, 1) else self._face * SINGLE_TILE_FACTOR
+        face = self._face if map_tiles(light, geometry) != (1, 1) else self._face * SINGLE_TILE_FACTOR
         return max(face // SOFT_DIVISOR, LEAST_FACE) if light.kind == AREA else face
 
-    def size(self, light: Light) -> tuple[int, int]:
+    def size(self, geometry: GpuGeometry, light: Light) -> tuple[int, int]:
         """Width and height of the maps of `light`, texels."""
-        columns, rows = map_tiles(light)
-        return columns * self.side(light), rows * self.side(light)
+        columns, rows = map_tiles(light, geometry)
+        side = self.side(geometry, light)
+        return columns * side, rows * side
 
-    def new_textures(self, light: Light) -> MapTextures:
+    def new_textures(self, geometry: GpuGeometry, light: Light) -> MapTextures:
         """Textures of the size that maps of `light` need."""
         import moderngl
 
-        position, normal, flux = (self._context.texture(self.size(light), 4, dtype="f4") for _ in range(3))
-        flux.build_mipmaps(0, self.side(light).bit_length() - 1)
+        position, normal, flux = (self._context.texture(self.size(geometry, light), 4, dtype="f4") for _ in range(3))
+        flux.build_mipmaps(0, self.side(geometry, light).bit_length() - 1)
         for texture in (position, normal):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         flux.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
@@ -149,8 +150,8 @@ class ReflectiveShadowMapPass:
         they are given. Lamps other than AREA have one point, in their middle."""
         sample = map_points(light, sample_count)[sample_index]
         record = lamp_record(light, sample, geometry.origin)
-        target = textures or self.new_textures(light)
-        side = self.side(light)
+        target = textures or self.new_textures(geometry, light)
+        side = self.side(geometry, light)
         target.framebuffer.clear()
         # New storage: llvmpipe (Mesa 22) lets a write overtake draws that still read the old one.
         self._brightest.orphan()
@@ -174,7 +175,8 @@ class ReflectiveShadowMapPass:
         self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
         self._brightest.bind_to_storage_buffer(int(CONSTANTS["RESULT_BINDING"]))
         corner = face.tile[0] * side, face.tile[1] * side
-        set_uniforms(self._resolve.program, {"tile_corner": corner, "extent": face.extent, "side": float(side)})
+        place = {"tile_corner": corner, "extent": face.extent, "centre": face.centre, "side": float(side)}
+        set_uniforms(self._resolve.program, place)
         target.framebuffer.viewport = (*corner, side, side)
         self._resolve.draw(target.framebuffer)
 
@@ -235,9 +237,9 @@ class LampReflections:
             if self._keep(index):
                 yield self._kept[index]
                 continue
-            size = self._pass.size(light)
+            size = self._pass.size(self._geometry, light)
             if size not in self._shared:
-                self._shared[size] = self._pass.new_textures(light)
+                self._shared[size] = self._pass.new_textures(self._geometry, light)
             yield self._pass.render(self._geometry, light, sample, count, self._shared[size])
 
     def _keep(self, index: int) -> bool:
@@ -245,7 +247,7 @@ class LampReflections:
         if index in self._kept:
             return True
         light, sample, count = self._sources[index]
-        width, height = self._pass.size(light)
+        width, height = self._pass.size(self._geometry, light)
         needed = width * height * BYTES_PER_TEXEL
         if self._kept_bytes + needed > CACHE_BYTES:
             return False
