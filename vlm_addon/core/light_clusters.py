@@ -35,7 +35,7 @@ SOFTNESS = math.sqrt(3.0)
 # Error of a cluster at a distance d, as a share of power / (pi d²), found on the atrium under smooth light and under
 # lamps that light from 20 to some hundreds of 100,000 lights (tests/core/test_light_cut_accuracy.py):
 # _SIZE_ERROR (radius / d)^4, because four points have the lights' mean and spread but not their shape;
-_SIZE_ERROR = 0.12
+_SIZE_ERROR = 0.07
 # _NORMAL_ERROR sqrt(1 - flux / power), because normals are not spread evenly;
 _NORMAL_ERROR = 0.42
 # _HORIZON_ERROR spread / d, which happens where a horizon cuts through: seldom, so not added to the others.
@@ -45,6 +45,11 @@ _COMMON_ERROR = 0.05
 # Nearer than so many radii the four points are no longer like the lights.
 _NEAREST_RADII = 1.0
 _DARK = 1e-20
+# Of the lights' area in that of all surfaces: under an open sky, light that misses all of them is no reason to ask for
+# more than a tenth of the error.
+_LEAST_SHARE = 0.1
+# Of the mean irradiance: one step moves windows by some 4 % at most.
+_STEPS_PER_DOUBLING = 8
 
 
 @dataclass(frozen=True)
@@ -83,11 +88,11 @@ def light_clusters(
 ) -> LightClusters:
     """radiosity: (n, 3) float64, W/m², of all lights. tolerance: error of the irradiance, as a share of it.
 
-    mean_irradiance: W/m², sum over the channels, over the surfaces that are to be lit; as the lights' own surfaces
-    would receive in a closed room (power / area of all lights) where it is not given.
+    mean_irradiance: W/m², sum over the channels, over the surfaces that are to be lit; `room_irradiance` of the lights'
+    own surfaces where it is not given.
     """
     if mean_irradiance is None:
-        mean_irradiance = _mean_radiosity(light_mesh, radiosity)
+        mean_irradiance = room_irradiance(light_mesh, radiosity)
     # Near the lights, so that differences of squares keep their digits.
     origin = tree.centroid.mean(axis=0) if len(tree) else np.zeros(3)
     members = tree.light_order
@@ -111,10 +116,19 @@ def light_clusters(
     )
 
 
-def _mean_radiosity(light_mesh: VirtualLightMesh, radiosity: Float64) -> float:
-    """W/m², sum over the channels."""
+def room_irradiance(light_mesh: VirtualLightMesh, radiosity: Float64, surface_area: float = 0.0) -> float:
+    """W/m², sum over the channels: mean of a closed room in which light from the lights is spread over all surfaces.
+
+    radiosity: (n, 3) W/m². surface_area: m², of the visible surface, which may be larger than that of the lights.
+    Rounded down to a step, so that light that changes a little changes no cluster by it.
+    """
     areas = triangle_areas(light_mesh.corners)
-    return float(areas @ radiosity.sum(axis=1)) / max(float(areas.sum()), float(np.finfo(float).tiny))
+    power = float(areas @ radiosity.sum(axis=1))
+    if not power > 0.0:
+        return 0.0
+    area = float(areas.sum())
+    mean = power / min(max(area, surface_area), area / _LEAST_SHARE)
+    return 2.0 ** (math.floor(_STEPS_PER_DOUBLING * math.log2(mean)) / _STEPS_PER_DOUBLING)
 
 
 def _moments(corners: Float64, radiosity: Float64) -> Float64:
