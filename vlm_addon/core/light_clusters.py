@@ -39,7 +39,7 @@ _SIZE_ERROR = 0.07
 # _NORMAL_ERROR sqrt(1 - flux / power), because normals are not spread evenly;
 _NORMAL_ERROR = 0.42
 # _HORIZON_ERROR spread / d, which happens where a horizon cuts through: seldom, so not added to the others.
-_HORIZON_ERROR = 0.05
+_HORIZON_ERROR = 0.1
 # The clusters of a plain wall err alike, by _COMMON_ERROR (radius / d)^4 of what they give: at most the tolerance.
 _COMMON_ERROR = 0.05
 # Nearer than so many radii the four points are no longer like the lights.
