@@ -15,7 +15,7 @@ from .core.light_mesh import VirtualLightMesh, empty_light_mesh
 from .core.progress import Progress, silent
 from .core.range_grid import RangeGrid
 from .core.scene import Finding, SceneSnapshot
-from .core.surface_points import random_surface_points
+from .core.surface_points import random_surface_points, surface_area
 from .core.validate import check_light_mesh
 
 SUBJECT = "light grid"
@@ -90,7 +90,7 @@ def bake_light_grid(
 ) -> GridBake:
     """The grid over all that is visible, as if every light received 1 W/m². Raises InvalidInput, Cancelled."""
     start = time.perf_counter()
-    grid = LightGrid.bake(light_mesh, snapshot.bounds(), settings, progress)
+    grid = LightGrid.bake(light_mesh, snapshot.bounds(), settings, progress, surface_area(snapshot.meshes))
     seconds = time.perf_counter() - start
     count = int(np.clip(_PAIRS // max(len(light_mesh), 1), _FEWEST_POINTS, _MOST_POINTS))
     points = random_surface_points(snapshot.meshes, count)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from .array_codec import content_hash
 from .errors import InvalidInput
 from .grid_frame import Bounds, finite_bounds, finite_points
-from .light_clusters import LightClusters, light_clusters
+from .light_clusters import LightClusters, light_clusters, room_irradiance
 from .light_cut import light_cut
 from .light_mesh import VirtualLightMesh, require_valid
 from .light_tree import LightTree, build_light_tree
@@ -49,15 +49,6 @@ class LitTree:
     tree: LightTree
     clusters: LightClusters
 
-    @classmethod
-    def made(cls, tree: LightTree, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float) -> LitTree:
-        """The tree under (n, 3) W/m² of all lights, with windows for `tolerance`."""
-        return cls(tree, light_clusters(tree, light_mesh, radiosity, tolerance))
-
-    def relit(self, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float) -> LitTree:
-        """The same tree under other light."""
-        return self.made(self.tree, light_mesh, radiosity, tolerance)
-
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
@@ -85,12 +76,14 @@ class Candidates:
 class LightGrid:
     """What was baked of a light mesh, immutable.
 
-    bounds: (2, 3) m, what the grid of range mode covers. static, dynamic: of the lights that stand and that move; None
+    bounds: (2, 3) m, what the grid of range mode covers. surface_area: m², of what is lit, where it is more than the
+    lights': it sets the scale of a tolerance. static, dynamic: of the lights that stand and that move; None
     where there are none. static_hash, dynamic_hash: of all that they depend on in the light mesh.
     """
 
     settings: GridSettings
     bounds: Float64
+    surface_area: float
     light_count: int
     static: RangeGrid | LitTree | None
     dynamic: RangeGrid | LitTree | None
@@ -104,15 +97,16 @@ class LightGrid:
         bounds: Bounds,
         settings: GridSettings | None = None,
         progress: Progress = silent,
+        surface_area: float = 0.0,
     ) -> LightGrid:
-        """The grid of a light mesh over `bounds` (lower and upper corner, m).
+        """The grid of a light mesh over `bounds` (lower and upper corner, m). surface_area: m², of what is lit.
 
         In tolerance mode its clusters are lit by `nominal_radiosity` until `relit`. Raises InvalidInput for lights or
         bounds that cannot be used, Cancelled when `progress` says so.
         """
         require_valid(light_mesh)
         settings = settings or GridSettings()
-        empty = cls(settings, finite_bounds(bounds), 0, None, None, "", "")
+        empty = cls(settings, finite_bounds(bounds), surface_area, 0, None, None, "", "")
         return empty.moved(light_mesh, progress)
 
     def moved(self, light_mesh: VirtualLightMesh, progress: Progress = silent) -> LightGrid:
@@ -126,10 +120,17 @@ class LightGrid:
                 structure = self._built(light_mesh, chosen, radiosity, progress)
             elif isinstance(structure, LitTree):
                 # What is allowed of a tree depends on all lights.
-                structure = structure.relit(light_mesh, radiosity, self.settings.tolerance)
+                structure = self._lit(structure.tree, light_mesh, radiosity)
             made.append((structure, new_hash))
         (static, static_hash), (dynamic, dynamic_hash) = made
-        return LightGrid(self.settings, self.bounds, len(light_mesh), static, dynamic, static_hash, dynamic_hash)
+        return replace(
+            self,
+            light_count=len(light_mesh),
+            static=static,
+            dynamic=dynamic,
+            static_hash=static_hash,
+            dynamic_hash=dynamic_hash,
+        )
 
     def _built(
         self, light_mesh: VirtualLightMesh, chosen: Bools, radiosity: Float64, progress: Progress
@@ -140,12 +141,16 @@ class LightGrid:
             of_range = RangeSettings(self.settings.grid, self.settings.range, self.settings.max_lights)
             return RangeGrid.bake(light_mesh, (self.bounds[0], self.bounds[1]), of_range, progress, chosen)
         step(progress, 0.0, "light tree")
-        return LitTree.made(build_light_tree(light_mesh, chosen), light_mesh, radiosity, self.settings.tolerance)
+        return self._lit(build_light_tree(light_mesh, chosen), light_mesh, radiosity)
+
+    def _lit(self, tree: LightTree, light_mesh: VirtualLightMesh, radiosity: Float64) -> LitTree:
+        mean = room_irradiance(light_mesh, radiosity, self.surface_area)
+        return LitTree(tree, light_clusters(tree, light_mesh, radiosity, self.settings.tolerance, mean))
 
     def relit(self, light_mesh: VirtualLightMesh, radiosity: Float64) -> LightGrid:
         """The grid under other light; radiosity: (n, 3) W/m². In range mode the same, in the other the same trees."""
         static, dynamic = (
-            part.relit(light_mesh, radiosity, self.settings.tolerance) if isinstance(part, LitTree) else part
+            self._lit(part.tree, light_mesh, radiosity) if isinstance(part, LitTree) else part
             for part in (self.static, self.dynamic)
         )
         return replace(self, static=static, dynamic=dynamic)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .light_tree_bounds import triangle_areas
 from .sampling import square_to_triangle
 from .scene import Float64, Int32, Mesh
 
@@ -19,6 +20,11 @@ class SurfacePoints:
     positions: Float64
     normals: Float64
     tag_ids: Int32
+
+
+def surface_area(meshes: Sequence[Mesh]) -> float:
+    """m² of all triangles."""
+    return sum(float(triangle_areas(mesh.positions[mesh.triangles]).sum()) for mesh in meshes)
 
 
 def random_surface_points(meshes: Sequence[Mesh], count: int, seed: int = 0) -> SurfacePoints:

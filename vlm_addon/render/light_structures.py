@@ -16,13 +16,14 @@ import numpy.typing as npt
 from ..core.active_hemisphere import HalfBalls
 from ..core.array_codec import content_hash
 from ..core.grid_frame import Bounds, GridFrame, make_frame
-from ..core.light_clusters import light_clusters
+from ..core.light_clusters import light_clusters, room_irradiance
 from ..core.light_grid import LitTree
 from ..core.light_mesh import VirtualLightMesh
 from ..core.light_tree import build_light_tree
 from ..core.progress import Progress
 from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
-from ..core.scene import Float32, Float64, SceneSnapshot
+from ..core.scene import Float32, SceneSnapshot
+from ..core.surface_points import surface_area
 from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
 from .passes.phase_two_range import GpuRangeGrid
 from .shader_library import ShaderLibrary
@@ -34,11 +35,6 @@ T = TypeVar("T")
 Bools = npt.NDArray[np.bool_]
 
 STATIC, DYNAMIC = "static", "dynamic"
-LEAST_SHARE = 0.1
-"""Of the lights' area in that of all surfaces: under an open sky, light that misses all of them is no reason to ask for
-more than a tenth of the error."""
-STEPS_PER_DOUBLING = 8
-"""Of the mean irradiance: one moves windows by some 4 % at most."""
 
 
 class LightStructures:
@@ -59,7 +55,7 @@ class LightStructures:
         """
         result = []
         values = radiosity.astype(np.float64)
-        mean = _mean_irradiance(snapshot, light_mesh, values)
+        mean = room_irradiance(light_mesh, values, surface_area(snapshot.meshes))
         for kind, chosen in chosen_lights(light_mesh).items():
             if not chosen.any():
                 continue
@@ -127,30 +123,6 @@ def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, Bools]:
 def shape_hash(light_mesh: VirtualLightMesh, chosen: Bools) -> str:
     """Hash of all that a structure over the `chosen` lights depends on."""
     return content_hash([chosen, light_mesh.corners[chosen], light_mesh.tag_ids[chosen]])
-
-
-def _mean_irradiance(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float64) -> float:
-    """W/m², sum over the channels: of a closed room with the surfaces there are.
-
-    Light from a few of them only is spread over all. Rounded down to a step, so that what changes a little changes no
-    cluster.
-    """
-    areas = light_mesh.areas
-    power = float(areas @ radiosity.sum(axis=1))
-    if not power > 0.0:
-        return 0.0
-    area = float(areas.sum())
-    mean = power / min(max(area, _visible_area(snapshot)), area / LEAST_SHARE)
-    return float(2.0 ** (np.floor(STEPS_PER_DOUBLING * np.log2(mean)) / STEPS_PER_DOUBLING))
-
-
-def _visible_area(snapshot: SceneSnapshot) -> float:
-    """m² of all visible triangles."""
-    area = 0.0
-    for mesh in snapshot.meshes:
-        a, b, c = np.moveaxis(mesh.positions[mesh.triangles], 1, 0)
-        area += 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    return area
 
 
 def _bounds(snapshot: SceneSnapshot, only_static: bool) -> Bounds:
