@@ -258,9 +258,11 @@ def test_a_million_watts_are_a_million_times_one(device: Device) -> None:
     generator = np.random.default_rng(13)
     lights, pixels = box_lights(10, generator), room_pixels(generator)
     radiosity = generator.uniform(0.5, 1.0, (len(lights), 3)).astype(np.float32)
-    found = clustered(device, pixels, lights, radiosity)
-    bright = clustered(device, pixels, lights, np.float32(1e6) * radiosity)
-    assert bright == pytest.approx(1e6 * found, rel=1e-4, abs=10.0)
+    bright = np.float32(1e6) * radiosity
+    found, exact = clustered(device, pixels, lights, bright), cut(pixels, lights, bright)
+    assert found == pytest.approx(exact, rel=2e-4, abs=10.0)
+    # Rounding may choose other windows, which changes no more than a tolerance allows.
+    assert found == pytest.approx(1e6 * clustered(device, pixels, lights, radiosity), rel=0.02)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
