@@ -12,10 +12,11 @@ import numpy as np
 from .core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid, nominal_radiosity
 from .core.light_grid_error import GridError, grid_error
 from .core.light_mesh import VirtualLightMesh, empty_light_mesh
+from .core.light_scale import PROBES
 from .core.progress import Progress, silent
 from .core.range_grid import RangeGrid
 from .core.scene import Finding, SceneSnapshot
-from .core.surface_points import random_surface_points, surface_area
+from .core.surface_points import random_surface_points
 from .core.validate import check_light_mesh
 
 SUBJECT = "light grid"
@@ -90,10 +91,11 @@ def bake_light_grid(
 ) -> GridBake:
     """The grid over all that is visible, as if every light received 1 W/m². Raises InvalidInput, Cancelled."""
     start = time.perf_counter()
-    grid = LightGrid.bake(light_mesh, snapshot.bounds(), settings, progress, surface_area(snapshot.meshes))
+    probes = random_surface_points(snapshot.meshes, PROBES)
+    grid = LightGrid.bake(light_mesh, snapshot.bounds(), settings, progress, probes)
     seconds = time.perf_counter() - start
     count = int(np.clip(_PAIRS // max(len(light_mesh), 1), _FEWEST_POINTS, _MOST_POINTS))
-    points = random_surface_points(snapshot.meshes, count)
+    points = random_surface_points(snapshot.meshes, count, seed=1)
     error = grid_error(grid, light_mesh, nominal_radiosity(light_mesh), points)
     return GridBake(grid, seconds, error)
 

@@ -4,7 +4,7 @@
 import numpy as np
 
 from tests.core.surface_shapes import mesh_of
-from vlm_addon.core.surface_points import random_surface_points, surface_area
+from vlm_addon.core.surface_points import random_surface_points
 
 COUNT = 20_000
 # A square of 1 m² at z = 0 in two halves, and a triangle of 3 m² at z = 2 that faces down.
@@ -41,8 +41,3 @@ def test_the_same_seed_gives_the_same_points():
 def test_surfaces_without_area_have_no_points():
     assert len(random_surface_points([], 5).positions) == 0
     assert len(random_surface_points([surface(0.0 * SQUARE)], 5).positions) == 0
-
-
-def test_area_is_that_of_all_surfaces():
-    assert surface_area([surface(SQUARE), surface(BELOW)]) == 4.0
-    assert surface_area([]) == 0.0

@@ -45,11 +45,6 @@ _COMMON_ERROR = 0.05
 # Nearer than so many radii the four points are no longer like the lights.
 _NEAREST_RADII = 1.0
 _DARK = 1e-20
-# Of the lights' area in that of all surfaces: under an open sky, light that misses all of them is no reason to ask for
-# more than a tenth of the error.
-_LEAST_SHARE = 0.1
-# Of the mean irradiance: one step moves windows by some 4 % at most.
-_STEPS_PER_DOUBLING = 8
 
 
 @dataclass(frozen=True)
@@ -103,6 +98,7 @@ def light_clusters(
     mean = np.where((power > 0.0)[:, None], mean / lit[:, None], tree.centroid - origin)
     spread = symmetric(sums[7:13] / lit) - np.einsum("ci,cj->cij", mean, mean)
     axes = _axes_along(spread, tree.plane_axes)
+    off_centre = np.linalg.norm(mean + origin - tree.centroid, axis=1)
     return LightClusters(
         power=power,
         mean=mean + origin,
@@ -112,23 +108,14 @@ def light_clusters(
         colour=sums[20:].T / lit[:, None],
         # A quarter of the disc that has the power at the mean radiosity of the lights, each by its power.
         least_squared=power * power / (4.0 * np.pi * np.maximum(sums[19], np.finfo(float).tiny)),
-        window=_windows(tree, lit, flux, axes, tolerance, tolerance * mean_irradiance),
+        window=_windows(tree, lit, flux, axes, tolerance, tolerance * mean_irradiance, off_centre),
     )
 
 
-def room_irradiance(light_mesh: VirtualLightMesh, radiosity: Float64, surface_area: float = 0.0) -> float:
-    """W/m², sum over the channels: mean of a closed room in which light from the lights is spread over all surfaces.
-
-    radiosity: (n, 3) W/m². surface_area: m², of the visible surface, which may be larger than that of the lights.
-    Rounded down to a step, so that light that changes a little changes no cluster by it.
-    """
+def room_irradiance(light_mesh: VirtualLightMesh, radiosity: Float64) -> float:
+    """W/m², sum over the channels: mean of a closed room whose walls are the lights; radiosity: (n, 3) W/m²."""
     areas = triangle_areas(light_mesh.corners)
-    power = float(areas @ radiosity.sum(axis=1))
-    if not power > 0.0:
-        return 0.0
-    area = float(areas.sum())
-    mean = power / min(max(area, surface_area), area / _LEAST_SHARE)
-    return 2.0 ** (math.floor(_STEPS_PER_DOUBLING * math.log2(mean)) / _STEPS_PER_DOUBLING)
+    return float(areas @ radiosity.sum(axis=1)) / max(float(areas.sum()), float(np.finfo(float).tiny))
 
 
 def _moments(corners: Float64, radiosity: Float64) -> Float64:
@@ -203,10 +190,17 @@ def cluster_error(tree: LightTree, clusters: LightClusters, rows: npt.NDArray[np
 
 
 def _windows(
-    tree: LightTree, power: Float64, flux: Float64, axes: Float64, tolerance: float, allowed: float
+    tree: LightTree,
+    power: Float64,
+    flux: Float64,
+    axes: Float64,
+    tolerance: float,
+    allowed: float,
+    off_centre: Float64,
 ) -> Float64:
     """(c,) m: where a cluster's error falls to `allowed` (W/m²); that of two causes by the sum of their squares.
 
+    off_centre: (c,) m, of the power's mean from the centroid: a lit corner may be so much nearer than the whole.
     Nested: a parent's window reaches a cluster's window and the distance between their centroids, so that the parent's
     weight is nowhere less than the cluster's.
     """
@@ -216,7 +210,7 @@ def _windows(
     window = np.sqrt(by_size + source * _normal_error(power, flux))
     window = np.maximum(window, np.cbrt(_HORIZON_ERROR * source * _spread(axes)))
     radii = max(_NEAREST_RADII, (_COMMON_ERROR / max(tolerance, smallest)) ** 0.25)
-    window = np.maximum(window, radii * tree.radius)
+    window = np.maximum(window, radii * tree.radius) + off_centre
     for part in tree.depths():
         outer = tree.parent[part]
         if outer[0] != ROOT:

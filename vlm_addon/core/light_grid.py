@@ -17,19 +17,22 @@ import numpy.typing as npt
 from .array_codec import content_hash
 from .errors import InvalidInput
 from .grid_frame import Bounds, finite_bounds, finite_points
-from .light_clusters import LightClusters, light_clusters, room_irradiance
+from .light_clusters import LightClusters, light_clusters
 from .light_cut import light_cut
 from .light_mesh import VirtualLightMesh, require_valid
+from .light_scale import mean_irradiance
 from .light_tree import LightTree, build_light_tree
 from .progress import Progress, silent, step
 from .range_grid import RangeGrid, RangeSettings
 from .scene import Float64
 from .settings import setting
+from .surface_points import NO_POINTS, SurfacePoints
 
 TOLERANCE, RANGE = "tolerance", "range"
 
 Bools = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
+Structure = RangeGrid | LightTree
 
 
 @dataclass(frozen=True)
@@ -76,14 +79,14 @@ class Candidates:
 class LightGrid:
     """What was baked of a light mesh, immutable.
 
-    bounds: (2, 3) m, what the grid of range mode covers. surface_area: m², of what is lit, where it is more than the
-    lights': it sets the scale of a tolerance. static, dynamic: of the lights that stand and that move; None
+    bounds: (2, 3) m, what the grid of range mode covers. probes: points of what is lit: their mean
+    irradiance is the scale of a tolerance. static, dynamic: of the lights that stand and that move; None
     where there are none. static_hash, dynamic_hash: of all that they depend on in the light mesh.
     """
 
     settings: GridSettings
     bounds: Float64
-    surface_area: float
+    probes: SurfacePoints
     light_count: int
     static: RangeGrid | LitTree | None
     dynamic: RangeGrid | LitTree | None
@@ -97,61 +100,53 @@ class LightGrid:
         bounds: Bounds,
         settings: GridSettings | None = None,
         progress: Progress = silent,
-        surface_area: float = 0.0,
+        probes: SurfacePoints = NO_POINTS,
     ) -> LightGrid:
-        """The grid of a light mesh over `bounds` (lower and upper corner, m). surface_area: m², of what is lit.
+        """The grid of a light mesh over `bounds` (lower and upper corner, m). probes: points of what is lit.
 
         In tolerance mode its clusters are lit by `nominal_radiosity` until `relit`. Raises InvalidInput for lights or
         bounds that cannot be used, Cancelled when `progress` says so.
         """
         require_valid(light_mesh)
         settings = settings or GridSettings()
-        empty = cls(settings, finite_bounds(bounds), surface_area, 0, None, None, "", "")
+        empty = cls(settings, finite_bounds(bounds), probes, 0, None, None, "", "")
         return empty.moved(light_mesh, progress)
 
     def moved(self, light_mesh: VirtualLightMesh, progress: Progress = silent) -> LightGrid:
         """The grid of the lights as they are now; a structure of which nothing has changed is kept. As `bake`."""
         old = ((self.static, self.static_hash), (self.dynamic, self.dynamic_hash))
-        made: list[tuple[RangeGrid | LitTree | None, str]] = []
-        radiosity = nominal_radiosity(light_mesh)
+        made: list[Structure | None] = []
+        hashes = []
         for (structure, old_hash), chosen in zip(old, (~light_mesh.dynamic, light_mesh.dynamic), strict=True):
-            new_hash = lights_hash(light_mesh, chosen, self.settings.mode)
-            if new_hash != old_hash:
-                structure = self._built(light_mesh, chosen, radiosity, progress)
-            elif isinstance(structure, LitTree):
-                # What is allowed of a tree depends on all lights.
-                structure = self._lit(structure.tree, light_mesh, radiosity)
-            made.append((structure, new_hash))
-        (static, static_hash), (dynamic, dynamic_hash) = made
-        return replace(
-            self,
-            light_count=len(light_mesh),
-            static=static,
-            dynamic=dynamic,
-            static_hash=static_hash,
-            dynamic_hash=dynamic_hash,
-        )
+            hashes.append(lights_hash(light_mesh, chosen, self.settings.mode))
+            kept = hashes[-1] == old_hash
+            made.append(_unlit(structure) if kept else self._built(light_mesh, chosen, progress))
+        grid = replace(self, light_count=len(light_mesh), static_hash=hashes[0], dynamic_hash=hashes[1])
+        return grid._lit(made, light_mesh, nominal_radiosity(light_mesh))
 
-    def _built(
-        self, light_mesh: VirtualLightMesh, chosen: Bools, radiosity: Float64, progress: Progress
-    ) -> RangeGrid | LitTree | None:
+    def _built(self, light_mesh: VirtualLightMesh, chosen: Bools, progress: Progress) -> Structure | None:
         if not chosen.any():
             return None
         if self.settings.mode == RANGE:
             of_range = RangeSettings(self.settings.grid, self.settings.range, self.settings.max_lights)
             return RangeGrid.bake(light_mesh, (self.bounds[0], self.bounds[1]), of_range, progress, chosen)
         step(progress, 0.0, "light tree")
-        return self._lit(build_light_tree(light_mesh, chosen), light_mesh, radiosity)
-
-    def _lit(self, tree: LightTree, light_mesh: VirtualLightMesh, radiosity: Float64) -> LitTree:
-        mean = room_irradiance(light_mesh, radiosity, self.surface_area)
-        return LitTree(tree, light_clusters(tree, light_mesh, radiosity, self.settings.tolerance, mean))
+        return build_light_tree(light_mesh, chosen)
 
     def relit(self, light_mesh: VirtualLightMesh, radiosity: Float64) -> LightGrid:
         """The grid under other light; radiosity: (n, 3) W/m². In range mode the same, in the other the same trees."""
+        return self._lit([_unlit(self.static), _unlit(self.dynamic)], light_mesh, radiosity)
+
+    def _lit(self, parts: list[Structure | None], light_mesh: VirtualLightMesh, radiosity: Float64) -> LightGrid:
+        """With the static and the dynamic part, trees lit."""
+        trees = [part for part in parts if isinstance(part, LightTree)]
+        mean = mean_irradiance(trees, light_mesh, radiosity, self.probes)
+        tolerance = self.settings.tolerance
         static, dynamic = (
-            self._lit(part.tree, light_mesh, radiosity) if isinstance(part, LitTree) else part
-            for part in (self.static, self.dynamic)
+            LitTree(part, light_clusters(part, light_mesh, radiosity, tolerance, mean))
+            if isinstance(part, LightTree)
+            else part
+            for part in parts
         )
         return replace(self, static=static, dynamic=dynamic)
 
@@ -219,6 +214,10 @@ class LightGrid:
         if hashes != [self.static_hash, self.dynamic_hash]:
             problem = f"it was baked from {self.light_count:,} other lights or other shapes of them"
             raise InvalidInput("light grid", problem, "bake it again")
+
+
+def _unlit(part: RangeGrid | LitTree | None) -> Structure | None:
+    return part.tree if isinstance(part, LitTree) else part
 
 
 def nominal_radiosity(light_mesh: VirtualLightMesh) -> Float64:

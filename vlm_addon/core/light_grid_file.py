@@ -24,6 +24,7 @@ from .errors import InvalidInput
 from .light_grid import RANGE, GridSettings, LightGrid, LitTree
 from .light_mesh import VirtualLightMesh
 from .range_grid import RangeGrid
+from .surface_points import SurfacePoints
 
 MAGIC = b"VLMGRID\n"
 VERSION = 2
@@ -122,7 +123,7 @@ def _grid(body: memoryview) -> LightGrid:
     for name in ("static", "dynamic"):
         if values[name] is not None:
             values[name] = _made(structure, values[name])
-    return LightGrid(**{**values, "settings": settings})
+    return LightGrid(**{**values, "settings": settings, "probes": _made(SurfacePoints, values["probes"])})
 
 
 def _made(kind: Any, tree: dict[str, Any]) -> Any:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .light_tree_bounds import triangle_areas
 from .sampling import square_to_triangle
 from .scene import Float64, Int32, Mesh
 
@@ -22,9 +21,7 @@ class SurfacePoints:
     tag_ids: Int32
 
 
-def surface_area(meshes: Sequence[Mesh]) -> float:
-    """m² of all triangles."""
-    return sum(float(triangle_areas(mesh.positions[mesh.triangles]).sum()) for mesh in meshes)
+NO_POINTS = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int32))
 
 
 def random_surface_points(meshes: Sequence[Mesh], count: int, seed: int = 0) -> SurfacePoints:
@@ -36,7 +33,7 @@ def random_surface_points(meshes: Sequence[Mesh], count: int, seed: int = 0) -> 
     double_areas = np.linalg.norm(normals, axis=1)
     total = double_areas.sum()
     if not total > 0.0:
-        return SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int32))
+        return NO_POINTS
     random = np.random.default_rng(seed)
     chosen = random.choice(len(corners), count, p=double_areas / total)
     weights = square_to_triangle(random.random(count), random.random(count))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -16,14 +17,15 @@ import numpy.typing as npt
 from ..core.active_hemisphere import HalfBalls
 from ..core.array_codec import content_hash
 from ..core.grid_frame import Bounds, GridFrame, make_frame
-from ..core.light_clusters import light_clusters, room_irradiance
+from ..core.light_clusters import light_clusters
 from ..core.light_grid import LitTree
 from ..core.light_mesh import VirtualLightMesh
-from ..core.light_tree import build_light_tree
+from ..core.light_scale import PROBES, mean_irradiance
+from ..core.light_tree import LightTree, build_light_tree
 from ..core.progress import Progress
 from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
 from ..core.scene import Float32, SceneSnapshot
-from ..core.surface_points import surface_area
+from ..core.surface_points import random_surface_points
 from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
 from .passes.phase_two_range import GpuRangeGrid
 from .shader_library import ShaderLibrary
@@ -53,23 +55,24 @@ class LightStructures:
 
         snapshot, light_mesh: in world space. radiosity: (n, 3) W/m².
         """
-        result = []
         values = radiosity.astype(np.float64)
-        mean = room_irradiance(light_mesh, values, surface_area(snapshot.meshes))
+        shapes: dict[str, str] = {}
+        trees: dict[str, LightTree] = {}
         for kind, chosen in chosen_lights(light_mesh).items():
-            if not chosen.any():
-                continue
-            shape = shape_hash(light_mesh, chosen)
+            if chosen.any():
+                shapes[kind] = shape_hash(light_mesh, chosen)
+                build = partial(build_light_tree, light_mesh, chosen)
+                trees[kind] = self.kept(f"{kind}_tree", shapes[kind], build)
+        probes = random_surface_points(snapshot.meshes, PROBES)
+        state = content_hash([*shapes.values(), radiosity, probes.positions, probes.normals, probes.tag_ids])
+        mean = self.kept("scale", state, lambda: mean_irradiance(list(trees.values()), light_mesh, values, probes))
+        result = []
+        for kind, tree in trees.items():
 
-            def build(chosen: Bools = chosen) -> Any:
-                return build_light_tree(light_mesh, chosen)
-
-            tree = self.kept(f"{kind}_tree", shape, build)
-
-            def relight(tree: Any = tree) -> LitTree:
+            def relight(tree: LightTree = tree) -> LitTree:
                 return LitTree(tree, light_clusters(tree, light_mesh, values, tolerance, mean))
 
-            state = content_hash([shape, radiosity[chosen], tolerance, mean])
+            state = content_hash([shapes[kind], radiosity[chosen_lights(light_mesh)[kind]], tolerance, mean])
             result.append(self.kept(f"{kind}_clusters", state, relight))
         return result
 
