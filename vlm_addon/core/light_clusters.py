@@ -44,6 +44,9 @@ _HORIZON_ERROR = 0.1
 _COMMON_ERROR = 0.05
 # Nearer than so many radii the four points are no longer like the lights.
 _NEAREST_RADII = 1.0
+# Nor nearer than this by the spread of their power: the points stand at sqrt(2) times it, which is outside of bodies
+# that lie apart.
+_NEAREST_SPREADS = 1.5 * math.sqrt(2.0)
 _DARK = 1e-20
 
 
@@ -210,7 +213,8 @@ def _windows(
     window = np.sqrt(by_size + source * _normal_error(power, flux))
     window = np.maximum(window, np.cbrt(_HORIZON_ERROR * source * _spread(axes)))
     radii = max(_NEAREST_RADII, (_COMMON_ERROR / max(tolerance, smallest)) ** 0.25)
-    window = np.maximum(window, radii * tree.radius) + off_centre
+    reach = np.maximum(radii * tree.radius, _NEAREST_SPREADS * np.linalg.norm(axes, axis=2).max(axis=1))
+    window = np.maximum(window, reach) + off_centre
     for part in tree.depths():
         outer = tree.parent[part]
         if outer[0] != ROOT:

@@ -17,8 +17,8 @@ PROBES = 200
 """Random points of the surface at which the mean is measured: it is known within some tenths."""
 # The mean is measured with clusters of this tolerance.
 _COARSE = 0.1
-# Of a closed room's: light that hardly meets a surface is no reason to ask for more than a tenth of the error.
-_LEAST_SHARE = 0.1
+# Of a closed room's mean: light that meets no surface at all is no reason to ask for no error at all.
+_LEAST_SHARE = 1e-2
 # One step moves windows by some 4 % at most.
 _STEPS_PER_DOUBLING = 8
 
