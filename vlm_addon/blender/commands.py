@@ -40,7 +40,8 @@ def bake_command(arguments: Namespace) -> None:
     """`bake`: writes the scene with its light mesh and a report."""
     outputs = [path for path in (arguments.save, arguments.json, arguments.light_grid) if path is not None]
     if not outputs:
-        raise InvalidInput("bake", "nothing would be written", "name --save OUT.blend, --light-grid OUT.vlmgrid or --json REPORT.json")
+        remedy = "name --save OUT.blend, --light-grid OUT.vlmgrid or --json REPORT.json"
+        raise InvalidInput("bake", "nothing would be written", remedy)
     settings = _simplify_settings(arguments.triangles)
     _require_apart(arguments.scene, outputs)
     opened, found = _open(arguments)
