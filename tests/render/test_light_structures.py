@@ -14,7 +14,6 @@ from vlm_addon.core.light_mesh import VirtualLightMesh, join
 from vlm_addon.core.scene import DIFFUSE, POINT, Float32, Float64, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.light_structures import LightStructures
 from vlm_addon.render.passes.tile_bounds import TILE_SIDE
 from vlm_addon.render.techniques.vlm import FEW_LIGHTS
 
@@ -147,20 +146,6 @@ def test_few_lights_are_summed_and_the_frame_says_why(device: Device) -> None:
     assert (frame.images["combined"] == exact.images["combined"]).all()
     assert not exact.reasons
     assert not device.render(room, many, settings()).reasons
-
-
-def test_only_the_latest_of_each_kind_is_kept() -> None:
-    structures = LightStructures(on_device=False)
-    made: list[int] = []
-
-    def make(value: int) -> Callable[[], int]:
-        return lambda: made.append(value) or value
-
-    assert [structures.kept("a", key, make(int(key))) for key in "1122"] == [1, 1, 2, 2]
-    assert structures.kept("b", "1", make(3)) == 3
-    assert structures.kept("a", "1", make(4)) == 4
-    assert made == [1, 2, 3, 4]
-    assert structures.built == {"a": 3, "b": 1}
 
 
 def lamp_frames(count: int) -> list[tuple[SceneSnapshot, VirtualLightMesh]]:

@@ -17,6 +17,7 @@ from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress, silent
 from ..core.scene import SceneSnapshot
 from .frame_types import Frame, RenderSettings
+from .kept import Kept
 from .light_structures import LightStructures
 from .shader_library import ShaderLibrary
 
@@ -42,7 +43,8 @@ class Device:
         self.name: str = self.context.info["GL_RENDERER"]
         self.is_software = any(word in self.name.lower() for word in SOFTWARE_RENDERERS)
         self.shaders = ShaderLibrary(self.context)
-        self.light_structures = LightStructures(on_device=not self.is_software)
+        self.kept = Kept()
+        self.light_structures = LightStructures(self.kept, on_device=not self.is_software)
         # moderngl never deletes a query, so frames share them.
         self._queries: list[Any] = []
 
@@ -59,7 +61,7 @@ class Device:
         if self._closed:
             return
         with self.current():
-            del self.shaders, self.light_structures
+            del self.shaders, self.light_structures, self.kept
         self._closed = True
         self.context.release()
 

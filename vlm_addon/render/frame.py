@@ -65,6 +65,7 @@ def render_frame(
         light_mesh,
         space,
         device.light_structures,
+        device.kept,
         settings,
         _within(progress, 0.0, PREPARED),
     )
@@ -93,6 +94,7 @@ def render_frame(
     if settings.buffers:
         images["coverage"] = np.ascontiguousarray(sums["direct"][..., 3:])
         images |= _surface_images(gbuffer_pass, geometry, camera, settings, space)
+        images |= technique.images()
     else:
         del images["irradiance"]
     counters = {

@@ -6,10 +6,9 @@ They are made in world space from geometry alone, so neither a lamp nor the came
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +25,7 @@ from ..core.progress import Progress
 from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
 from ..core.scene import Float32, SceneSnapshot
 from ..core.surface_points import random_surface_points
+from .kept import Kept
 from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
 from .passes.phase_two_range import GpuRangeGrid
 from .shader_library import ShaderLibrary
@@ -33,20 +33,18 @@ from .shader_library import ShaderLibrary
 if TYPE_CHECKING:
     import moderngl
 
-T = TypeVar("T")
 Bools = npt.NDArray[np.bool_]
 
 STATIC, DYNAMIC = "static", "dynamic"
 
 
 class LightStructures:
-    """A device's structures. built: how often each kind was made, by name, since the device was opened."""
+    """A device's structures."""
 
-    def __init__(self, on_device: bool) -> None:
+    def __init__(self, kept: Kept, on_device: bool) -> None:
         """on_device: grids are faster made by shaders than by numpy, which software renderers are not."""
+        self._kept = kept
         self._on_device = on_device
-        self._kept: dict[str, tuple[str, Any]] = {}
-        self.built: dict[str, int] = {}
 
     def trees(
         self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float
@@ -62,10 +60,10 @@ class LightStructures:
             if chosen.any():
                 shapes[kind] = shape_hash(light_mesh, chosen)
                 build = partial(build_light_tree, light_mesh, chosen)
-                trees[kind] = self.kept(f"{kind}_tree", shapes[kind], build)
+                trees[kind] = self._kept.get(f"{kind}_tree", shapes[kind], build)
         probes = random_surface_points(snapshot.meshes, PROBES)
         state = content_hash([*shapes.values(), radiosity, probes.positions, probes.normals, probes.tag_ids])
-        mean = self.kept("scale", state, lambda: mean_irradiance(list(trees.values()), light_mesh, values, probes))
+        mean = self._kept.get("scale", state, lambda: mean_irradiance(list(trees.values()), light_mesh, values, probes))
         result = []
         for kind, tree in trees.items():
 
@@ -73,7 +71,7 @@ class LightStructures:
                 return LitTree(tree, light_clusters(tree, light_mesh, values, tolerance, mean))
 
             state = content_hash([shapes[kind], radiosity[chosen_lights(light_mesh)[kind]], tolerance, mean])
-            result.append(self.kept(f"{kind}_clusters", state, relight))
+            result.append(self._kept.get(f"{kind}_clusters", state, relight))
         return result
 
     def range_grids(
@@ -103,19 +101,8 @@ class LightStructures:
                 grid = RangeGrid.bake(light_mesh, bounds, settings, progress, chosen)
                 return gpu_grid(context, grid.frame, grid.half_balls, upload(context, grid.lists))
 
-            result.append(self.kept(f"{kind}_grid", key, build))
+            result.append(self._kept.get(f"{kind}_grid", key, build))
         return result
-
-    def kept(self, kind: str, key: str, make: Callable[[], T]) -> T:
-        """What `make` made last time for this kind if that had the same key, else what it makes now."""
-        found = self._kept.get(kind)
-        if found is None or found[0] != key:
-            # The old one is let go of before there is a new one.
-            self._kept.pop(kind, None)
-            found = key, make()
-            self._kept[kind] = found
-            self.built[kind] = self.built.get(kind, 0) + 1
-        return found[1]
 
 
 def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, Bools]:

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
-from ..core.scene import SceneSnapshot
+from ..core.scene import Float32, SceneSnapshot
 from . import techniques
 from .frame_types import RenderSettings
 from .geometry import GpuGeometry
+from .kept import Kept
 from .light_structures import LightStructures
 from .local_space import LocalSpace
 from .passes.gbuffer import GBuffer
@@ -36,7 +37,8 @@ class SceneInputs:
     """What stays the same over the samples of a frame.
 
     light_mesh: None where the caller gave none. world, world_lights: snapshot and light mesh in world space; space:
-    where the others are. structures: what the device keeps over frames. progress: of the work before the first sample.
+    where the others are. structures, kept: what the
+    device keeps over frames. progress: of the work before the first sample.
     """
 
     context: moderngl.Context
@@ -50,6 +52,7 @@ class SceneInputs:
     world_lights: VirtualLightMesh | None
     space: LocalSpace
     structures: LightStructures
+    kept: Kept
     settings: RenderSettings
     progress: Progress
 
@@ -94,6 +97,13 @@ class Technique(ABC):
 
     def counters(self) -> dict[str, float]:
         """What the technique counted so far in this frame."""
+        return {}
+
+    def images(self) -> dict[str, Float32]:
+        """Its intermediate buffers after the last sample, (h, w, c) linear, row 0 at the top, for people to look at.
+
+        Asked for where every buffer is written; names start with the technique's own.
+        """
         return {}
 
     def reasons(self) -> list[str]:

@@ -71,10 +71,10 @@ class VirtualLightMeshTechnique(Technique):
             self._radiosity = phase_one.render(
                 scene.light_mesh, scene.geometry.origin, scene.shadows, scene.settings.shadow_samples, scene.progress
             )
-        before = dict(scene.structures.built)
+        before = dict(scene.kept.built)
         self._sum = self._chosen_sum()
         kinds = self._sum.kinds
-        self._built = {f"{kind}_built": scene.structures.built.get(kind, 0) - before.get(kind, 0) for kind in kinds}
+        self._built = {f"{kind}_built": scene.kept.built.get(kind, 0) - before.get(kind, 0) for kind in kinds}
 
     def _chosen_sum(self) -> LightSum:
         """How the lights are summed."""
