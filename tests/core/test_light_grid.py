@@ -212,15 +212,98 @@ def test_settings_take_texts_and_refuse_what_is_out_of_range():
             from_mapping(GridSettings, bad, "bake")
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("mode", "foo"),
+        ("mode", None),
+        ("tolerance", np.nan),
+        ("tolerance", -0.02),
+        ("range", np.nan),
+        ("range", -1.0),
+        ("grid", 0),
+        ("grid", 2.5),
+        ("max_lights", 4.5),
+        ("max_lights", "many"),
+    ],
+)
+def test_settings_made_in_python_are_refused_as_typed_ones_are(name, value):
+    with pytest.raises(InvalidInput, match="the light grid") as caught:
+        GridSettings(**{name: value})
+    assert name in caught.value.subject
+    assert str(value) in caught.value.problem
+    assert caught.value.remedy
+
+
+def test_settings_of_another_kind_are_refused():
+    for other in ({"tolerance": 0.1}, RangeSettings()):
+        with pytest.raises(InvalidInput, match=f"{type(other).__name__}; give a GridSettings"):
+            LightGrid.bake(lights(), BOX, other)
+
+
 @pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])
-def test_refuses_what_it_cannot_use(settings):
-    for bounds in (((0, 0, 0), (1, np.nan, 1)), ((0, 0, 1), (1, 1, 0)), ((0, 0), (1, 1))):
-        with pytest.raises(InvalidInput, match="bounds"):
-            LightGrid.bake(lights(), bounds, settings)
+@pytest.mark.parametrize(
+    "bounds", [((0, 0, 0), (1, np.nan, 1)), ((0, 0, 1), (1, 1, 0)), ((0, 0), (1, 1)), "box", None, ((0, 0, 0),) * 3]
+)
+def test_refuses_bounds_it_cannot_use(settings, bounds):
+    with pytest.raises(InvalidInput, match="bounds"):
+        LightGrid.bake(lights(), bounds, settings)
+
+
+@pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])
+def test_refuses_lights_it_cannot_use(settings):
+    dark = replace(lights(), colour=-lights().colour - 1.0)
     with pytest.raises(InvalidInput, match="negative"):
-        LightGrid.bake(replace(lights(), colour=-lights().colour - 1.0), BOX, settings)
-    with pytest.raises(InvalidInput, match="points"):
-        LightGrid.bake(lights(), BOX, settings).candidates([[0.0, np.nan, 0.0]])
+        LightGrid.bake(dark, BOX, settings)
+    with pytest.raises(InvalidInput, match="negative"):
+        LightGrid.bake(lights(), BOX, settings).moved(dark)
+
+
+@pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])
+@pytest.mark.parametrize(
+    ("points", "says"),
+    [
+        ([[1.0, 2.0, 3.0], [0.0, np.nan, 0.0]], r"row 1: .*nan.* is not finite"),
+        ("x", "'x' is not an array of numbers"),
+        ([[1.0, 2.0, 3.0], [1.0]], "is not an array of numbers"),
+        ([1.0, 2.0, 3.0], r"shape \(3,\) is not"),
+        (np.zeros((4, 2)), r"shape \(4, 2\) is not"),
+    ],
+)
+def test_refuses_points_it_cannot_use(settings, points, says):
+    with pytest.raises(InvalidInput, match=f"light grid points.*{says}"):
+        LightGrid.bake(lights(), BOX, settings).candidates(points)
+
+
+@pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])
+def test_refuses_radiosity_it_cannot_use(settings):
+    light_mesh = lights(6)
+    grid = LightGrid.bake(light_mesh, BOX, settings)
+    for values, says in (
+        (np.zeros((5, 3)), r"light grid: shape \(5, 3\) for 6 lights"),
+        (np.zeros((6, 1)), r"light grid: shape \(6, 1\)"),
+        (np.zeros(18), r"light grid: shape \(18,\)"),
+        ("bright", "light grid: 'bright' is not an array of numbers"),
+        (with_light_4(np.nan), "light 4: .*nan.* is not finite"),
+        (with_light_4(np.inf), "light 4: .*inf.* is not finite"),
+        (with_light_4(-1.0), "light 4: .*-1.* is negative"),
+    ):
+        with pytest.raises(InvalidInput, match=f"radiosity of {says}"):
+            grid.relit(light_mesh, values)
+
+
+def with_light_4(value):
+    """Radiosity of 1 W/m² of six lights, but for a channel of light 4."""
+    radiosity = np.ones((6, 3))
+    radiosity[4, 1] = value
+    return radiosity
+
+
+@pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])
+def test_refuses_to_relight_with_another_number_of_lights(settings):
+    grid = LightGrid.bake(lights(6), BOX, settings)
+    with pytest.raises(InvalidInput, match="7 lights, the light grid was baked from 6"):
+        grid.relit(lights(7), np.ones((7, 3)))
 
 
 @pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])

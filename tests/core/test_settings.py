@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from vlm_addon.core.errors import InvalidInput
@@ -32,6 +33,10 @@ def test_without_values_the_defaults_stand():
         ("count", "4097", "out of range"),
         ("count", "many", "not of type int"),
         ("count", 1.5, "not of type int"),
+        ("count", None, "not of type int"),
+        ("count", np.float32(1.5), "not of type int"),
+        ("count", float("inf"), "not of type int"),
+        ("reach", [1.0], "not of type float"),
         ("reach", "nan", "out of range"),
         ("reach", "-1", "out of range"),
         ("on", "perhaps", "not of type bool"),

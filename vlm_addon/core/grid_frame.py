@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -77,17 +77,32 @@ def make_frame(bounds: Bounds, cells_per_axis: int) -> GridFrame:
 
 def finite_bounds(bounds: Bounds) -> Float64:
     """(2, 3) lower and upper corner. Raises InvalidInput where they are not finite or empty."""
-    low, high = (np.asarray(corner, np.float64) for corner in bounds)
-    if low.shape != (3,) or high.shape != (3,) or not np.isfinite(low + high).all() or (low > high).any():
-        raise InvalidInput("light grid bounds", f"{low} to {high}", "give the lower and upper corner of the scene")
-    return np.stack((low, high))
+    remedy = "give the lower and upper corner of the scene, (x, y, z) each"
+    corners = as_numbers(bounds, "light grid bounds", remedy)
+    if corners.shape != (2, 3):
+        raise InvalidInput("light grid bounds", f"shape {corners.shape} is not (2, 3)", remedy)
+    low, high = corners
+    if not np.isfinite(low + high).all() or (low > high).any():
+        raise InvalidInput("light grid bounds", f"{low} to {high}", remedy)
+    return corners
 
 
 def finite_points(points: npt.ArrayLike) -> Float64:
     """(p, 3) float64. Raises InvalidInput for another shape or what is not finite."""
-    array: npt.NDArray[Any] = np.asarray(points, np.float64)
+    array = as_numbers(points, "light grid points", "give (p, 3) numbers, m")
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidInput("light grid points", f"shape {array.shape}", "give (p, 3)")
-    if not np.isfinite(array).all():
-        raise InvalidInput("light grid points", "not all are finite", "remove NaN and infinity")
+        raise InvalidInput("light grid points", f"shape {array.shape} is not (p, 3)", "give one row of three per point")
+    finite = np.isfinite(array).all(axis=1)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        raise InvalidInput(f"light grid points row {row}", f"{array[row]} is not finite", "remove NaN and infinity")
     return array
+
+
+def as_numbers(values: object, subject: str, remedy: str) -> Float64:
+    """`values` as a float64 array. Raises InvalidInput that names `subject` where they are no such thing."""
+    try:
+        return np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        text = reprlib.repr(values)
+        raise InvalidInput(subject, f"{text} is not an array of numbers", remedy) from None

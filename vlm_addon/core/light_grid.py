@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from .array_codec import content_hash
 from .errors import InvalidInput
-from .grid_frame import Bounds, finite_bounds, finite_points
+from .grid_frame import Bounds, as_numbers, finite_bounds, finite_points
 from .light_clusters import LightClusters, light_clusters
 from .light_cut import light_cut
 from .light_mesh import VirtualLightMesh, require_valid
@@ -104,16 +104,19 @@ class LightGrid:
     ) -> LightGrid:
         """The grid of a light mesh over `bounds` (lower and upper corner, m). probes: points of what is lit.
 
-        In tolerance mode its clusters are lit by `nominal_radiosity` until `relit`. Raises InvalidInput for lights or
-        bounds that cannot be used, Cancelled when `progress` says so.
+        In tolerance mode its clusters are lit by `nominal_radiosity` until `relit`. Raises InvalidInput for lights,
+        settings or bounds that cannot be used, Cancelled when `progress` says so.
         """
-        require_valid(light_mesh)
-        settings = settings or GridSettings()
+        settings = GridSettings() if settings is None else settings
+        if not isinstance(settings, GridSettings):
+            problem = f"they are of type {type(settings).__name__}"
+            raise InvalidInput("settings of the light grid", problem, "give a GridSettings")
         empty = cls(settings, finite_bounds(bounds), probes, 0, None, None, "", "")
         return empty.moved(light_mesh, progress)
 
     def moved(self, light_mesh: VirtualLightMesh, progress: Progress = silent) -> LightGrid:
         """The grid of the lights as they are now; a structure of which nothing has changed is kept. As `bake`."""
+        require_valid(light_mesh)
         old = ((self.static, self.static_hash), (self.dynamic, self.dynamic_hash))
         made: list[Structure | None] = []
         hashes = []
@@ -133,9 +136,16 @@ class LightGrid:
         step(progress, 0.0, "light tree")
         return build_light_tree(light_mesh, chosen)
 
-    def relit(self, light_mesh: VirtualLightMesh, radiosity: Float64) -> LightGrid:
-        """The grid under other light; radiosity: (n, 3) W/m². In range mode the same, in the other the same trees."""
-        return self._lit([_unlit(self.static), _unlit(self.dynamic)], light_mesh, radiosity)
+    def relit(self, light_mesh: VirtualLightMesh, radiosity: npt.ArrayLike) -> LightGrid:
+        """The grid under other light; radiosity: (n, 3) W/m². In range mode the same, in the other the same trees.
+
+        Raises InvalidInput where the radiosity cannot be used, or the light mesh has another number of lights.
+        """
+        if len(light_mesh) != self.light_count:
+            problem = f"it has {len(light_mesh):,} lights, the light grid was baked from {self.light_count:,}"
+            raise InvalidInput("light mesh", problem, "relight with the light mesh that was baked, or bake again")
+        values = usable_radiosity(light_mesh, radiosity)
+        return self._lit([_unlit(self.static), _unlit(self.dynamic)], light_mesh, values)
 
     def _lit(self, parts: list[Structure | None], light_mesh: VirtualLightMesh, radiosity: Float64) -> LightGrid:
         """With the static and the dynamic part, trees lit."""
@@ -187,7 +197,7 @@ class LightGrid:
         )
 
     def candidates(self, points: npt.ArrayLike) -> Candidates:
-        """What lights (p, 3) points, m. Raises InvalidInput for points that are not finite.
+        """What lights (p, 3) points, m. Raises InvalidInput for another shape or points that are not finite.
 
         Tags are not looked at: whoever shades leaves out what has the tag of the surface.
         """
@@ -223,6 +233,21 @@ def _unlit(part: RangeGrid | LitTree | None) -> Structure | None:
 def nominal_radiosity(light_mesh: VirtualLightMesh) -> Float64:
     """(n, 3) W/m²: of lights on which 1 W/m² of each channel falls."""
     return np.asarray(light_mesh.strength[:, None] * (light_mesh.emission + light_mesh.colour), np.float64)
+
+
+def usable_radiosity(light_mesh: VirtualLightMesh, radiosity: npt.ArrayLike) -> Float64:
+    """(n, 3) float64. Raises InvalidInput for another shape, or a light's that is not finite or negative."""
+    values = as_numbers(radiosity, "radiosity of light grid", "give one row of three per light, W/m²")
+    if values.shape != (len(light_mesh), 3):
+        problem = f"shape {values.shape} for {len(light_mesh):,} lights"
+        raise InvalidInput("radiosity of light grid", problem, "give one row of three per light")
+    for usable, problem in ((np.isfinite(values), "is not finite"), (values >= 0.0, "is negative")):
+        if not usable.all():
+            row = int(np.argmin(usable.all(axis=1)))
+            raise InvalidInput(
+                f"radiosity of light {row}", f"{values[row]} {problem}", "give finite values of at least 0"
+            )
+    return values
 
 
 def lights_hash(light_mesh: VirtualLightMesh, chosen: Bools, mode: str) -> str:

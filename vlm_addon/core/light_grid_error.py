@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .errors import InvalidInput
 from .form_factor import polygon_form_factor
 from .grid_frame import OUTSIDE
 from .light_cut import cut_irradiance
-from .light_grid import LightGrid, LitTree
+from .light_grid import LightGrid, LitTree, usable_radiosity
 from .light_mesh import VirtualLightMesh
 from .range_grid import RangeGrid
 from .scene import UNTAGGED, Float64
@@ -81,10 +80,7 @@ def grid_error(
     Raises InvalidInput where the grid is not of these lights or the radiosity does not fit.
     """
     grid.require_made_of(light_mesh)
-    radiosity = np.asarray(radiosity, np.float64)
-    if radiosity.shape != (len(light_mesh), 3):
-        problem = f"shape {radiosity.shape} for {len(light_mesh)} lights"
-        raise InvalidInput("radiosity of light grid", problem, "give one row of three per light")
+    radiosity = usable_radiosity(light_mesh, radiosity)
     full, found, in_range = (np.zeros((len(points.positions), 3)) for _ in range(3))
     grids = [part for _, part in grid.structures if isinstance(part, RangeGrid)]
     listed = grid.candidates(points.positions) if grids else None

@@ -21,12 +21,12 @@ from .grid_frame import OUTSIDE, Bounds, GridFrame, finite_points, make_frame
 from .light_mesh import VirtualLightMesh, require_valid
 from .progress import Progress, silent
 from .scene import Float64
-from .settings import setting
+from .settings import checked_values, setting
 
 
 @dataclass(frozen=True)
 class RangeSettings:
-    """Settings of a light grid in range mode."""
+    """Settings of a light grid in range mode. Raises InvalidInput for what its fields do not allow."""
 
     grid: int = setting(
         50, "cells", 1, MAX_CELLS_PER_AXIS, "Cells along each side of the scene's box", source="002, 4.1"
@@ -37,6 +37,10 @@ class RangeSettings:
     max_lights: int = setting(
         0, "lights", 0, 1_000_000, "Most lights a cell holds; 0 for as many as reach it", source="002, 4.1"
     )
+
+    def __post_init__(self) -> None:
+        for name, value in checked_values(type(self), vars(self), "the light grid").items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)

@@ -67,8 +67,16 @@ def describe(settings_type: type) -> Iterator[SettingInfo]:
 def from_mapping(settings_type: type[S], values: Mapping[str, Any], owner: str) -> S:
     """Settings of `settings_type` with `values` (numbers, or texts as typed on a command line) in place of defaults.
 
-    Raises InvalidInput for an unknown name, a text that is not of the setting's type, or a value out of range;
-    `owner` names whose settings they are in the message.
+    Raises InvalidInput as `checked_values`.
+    """
+    return settings_type(**checked_values(settings_type, values, owner))
+
+
+def checked_values(settings_type: type, values: Mapping[str, Any], owner: str) -> dict[str, Any]:
+    """`values` as values of the types that the settings of `settings_type` have.
+
+    Raises InvalidInput for an unknown name, what is not of the setting's type, or a value out of range; `owner` names
+    whose settings they are in the message.
     """
     known = {info.name: info for info in describe(settings_type)}
     for name in values:
@@ -78,14 +86,14 @@ def from_mapping(settings_type: type[S], values: Mapping[str, Any], owner: str) 
                 "no such setting",
                 f"use one of: {', '.join(known) or 'none, it has no settings'}",
             )
-    return settings_type(**{name: _checked(known[name], value, owner) for name, value in values.items()})
+    return {name: _checked(known[name], value, owner) for name, value in values.items()}
 
 
 def _checked(info: SettingInfo, value: Any, owner: str) -> Any:
     subject = f"setting {info.name!r} of {owner}"
     try:
         converted = _convert(info.type, value)
-    except ValueError:
+    except (TypeError, ValueError, OverflowError):
         problem = f"{value!r} is not of type {info.type.__name__}"
         raise InvalidInput(subject, problem, "give a value of that type") from None
     if info.choices and converted not in info.choices:
@@ -105,6 +113,7 @@ def _convert(wanted: type, value: Any) -> Any:
         if value.lower() in ("false", "off", "no", "0"):
             return False
         raise ValueError(value)
-    if wanted is int and isinstance(value, float) and not value.is_integer():
+    converted = wanted(value)
+    if wanted is int and not isinstance(value, str) and converted != value:
         raise ValueError(value)
-    return wanted(value)
+    return converted
