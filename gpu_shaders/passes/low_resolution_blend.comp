@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fills in the pixels that look like their neighbours in the low-resolution G-buffer, and marks and counts the others,
+// one count a group (seed 001, 3.5).
+#include "passes/gbuffer_samplers.glsl"
+
+layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
+
+layout(binding = LOW_POSITION_UNIT) uniform sampler2D low_position;
+layout(binding = LOW_NORMAL_UNIT) uniform sampler2D low_normal;
+layout(binding = LOW_RESULT_UNIT) uniform sampler2D low_result;
+layout(rgba32f, binding = 0) writeonly uniform image2D result;
+layout(r8ui, binding = 1) writeonly uniform uimage2D is_redone;
+layout(std430, binding = COUNT_BINDING) writeonly buffer Counts { uint counts[]; };
+layout(std430, binding = SHOWN_BINDING) buffer Shown { uint shown; };
+
+uniform float normal_threshold;     // length of the difference of unit normals
+uniform float position_threshold;   // share of the picture's width
+uniform float width_at_0, width_per_depth; // of the picture, m: width_at_0 + width_per_depth x depth
+
+shared uint group_shown, group_redone;
+
+// Where `pixel` lies between the two texels `low` and `low` + 1 of the low-resolution picture along one axis.
+float share_between(int pixel, int low, int last) {
+    int from = min(FACTOR * low, last), to = min(FACTOR * (low + 1), last);
+    return to > from ? float(pixel - from) / float(to - from) : 0.0;
+}
+
+// Whether the pixel was filled in. pixel: shows a surface.
+bool blend(ivec2 pixel) {
+    ivec2 last = textureSize(gbuffer_position, 0) - 1;
+    ivec2 low_last = textureSize(low_position, 0) - 1;
+    ivec2 low = pixel / FACTOR;
+    vec2 share = vec2(share_between(pixel.x, low.x, last.x), share_between(pixel.y, low.y, last.y));
+    vec4 place = texelFetch(gbuffer_position, pixel, 0);
+    vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
+    float reach = position_threshold * (width_at_0 + width_per_depth * place.w);
+    vec4 sum = vec4(0.0);
+    float total = 0.0;
+    for (int k = 0; k < 4; ++k) {
+        ivec2 step = ivec2(k & 1, k >> 1);
+        float weight = (step.x == 1 ? share.x : 1.0 - share.x) * (step.y == 1 ? share.y : 1.0 - share.y);
+        ivec2 texel = min(low + step, low_last);
+        vec3 low_facing = texelFetch(low_normal, texel, 0).xyz;
+        if (weight == 0.0 || !shows_geometry(low_facing)) {
+            continue;
+        }
+        bool is_alike = distance(place.xyz, texelFetch(low_position, texel, 0).xyz) < reach
+            && distance(normal, low_facing) < normal_threshold;
+        if (!is_alike) {
+            return false;
+        }
+        sum += weight * texelFetch(low_result, texel, 0);
+        total += weight;
+    }
+    if (total == 0.0) {
+        return false;
+    }
+    imageStore(result, pixel, sum / total);
+    return true;
+}
+
+void main() {
+    if (gl_LocalInvocationIndex == 0u) {
+        group_shown = group_redone = 0u;
+    }
+    barrier();
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (all(lessThan(pixel, imageSize(result)))) {
+        bool shows = pixel_shows_geometry(pixel);
+        bool redo = shows && !blend(pixel);
+        imageStore(is_redone, pixel, uvec4(redo ? 1u : 0u));
+        atomicAdd(group_shown, shows ? 1u : 0u);
+        atomicAdd(group_redone, redo ? 1u : 0u);
+    }
+    barrier();
+    if (gl_LocalInvocationIndex == 0u) {
+        counts[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x] = group_redone;
+        atomicAdd(shown, group_shown);
+    }
+}
