@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +18,17 @@ from vlm_addon.core import light_grid_file
 from vlm_addon.core.array_codec import content_hash, flatten
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_grid import RANGE, GridSettings, LightGrid
+from vlm_addon.core.light_grid_error import grid_error
 from vlm_addon.core.light_grid_file import MAGIC, VERSION, load_light_grid, save_light_grid
+from vlm_addon.core.surface_points import SurfacePoints
 
+HEADER = struct.Struct("<8sIQ32s")
 BOX = ((-2.0, -2.0, -1.0), (2.0, 3.0, 1.0))
 SETTINGS = {"range": GridSettings(3, 2.0, 4, RANGE), "tolerance": GridSettings(tolerance=0.3)}
 LIGHTS = replace(random_lights(0, 12), dynamic=np.arange(12) < 5)
+POINTS = SurfacePoints(
+    np.random.default_rng(0).uniform(*BOX, (20, 3)), np.tile([0.0, 0.0, 1.0], (20, 1)), np.zeros(20, np.int32)
+)
 
 
 @pytest.fixture(scope="module", params=SETTINGS)
@@ -88,6 +96,138 @@ def leaves(tree, path=""):
     if not isinstance(tree, dict) or "$array" in tree:
         return [path]
     return [name for key, value in tree.items() for name in leaves(value, f"{path}.{key}")]
+
+
+def forged(whole, change):
+    """The file with a body that `change` makes of what it says and of its bytes, and a checksum that fits."""
+    body = whole[HEADER.size :]
+    start = 8 + int.from_bytes(body[:8], "little")
+    return with_body(change(json.loads(body[8:start]), body[start:]))
+
+
+def said(described, arrays):
+    """A body."""
+    text = json.dumps(described).encode()
+    text += b" " * (-len(text) % 8)
+    return len(text).to_bytes(8, "little") + text + arrays
+
+
+def with_body(body):
+    digest = hashlib.sha256(MAGIC + VERSION.to_bytes(4, "little") + body).digest()
+    return HEADER.pack(MAGIC, VERSION, len(body), digest) + body
+
+
+def owner_of(tree, name):
+    """The dict that holds the field of a dotted name, and its last word."""
+    *owners, last = name.split(".")[1:]
+    for owner in owners:
+        tree = tree[owner]
+    return tree, last
+
+
+def names_within(tree, path=""):
+    """Dotted names of all fields, those that hold fields as well."""
+    if not isinstance(tree, dict) or "$array" in tree:
+        return []
+    return [name for key, value in tree.items() for name in (f"{path}.{key}", *names_within(value, f"{path}.{key}"))]
+
+
+def said_by(whole):
+    return json.loads(whole[HEADER.size + 8 :][: int.from_bytes(whole[HEADER.size :][:8], "little")])
+
+
+def test_a_forged_body_that_says_the_same_is_read(grid, whole, tmp_path):
+    """Else the tests below would see a refusal for another reason."""
+    path = tmp_path / "same.vlmgrid"
+    path.write_bytes(forged(whole, said))
+    assert content_hash(load_light_grid(path, LIGHTS)) == content_hash(grid)
+
+
+def test_forged_files_with_missing_or_extra_fields_are_refused(whole, tmp_path):
+    for name in names_within(said_by(whole)["tree"]):
+        for edit in (lambda owner, last: owner.pop(last), lambda owner, last: owner.update({f"{last}_too": 1})):
+
+            def change(described, arrays, name=name, edit=edit):
+                edit(*owner_of(described["tree"], name))
+                return said(described, arrays)
+
+            refused(tmp_path / "forged.vlmgrid", forged(whole, change))
+
+
+@pytest.mark.parametrize("value", [None, "x", -1, 2.5, [], {}])
+def test_forged_files_with_values_of_another_kind_are_refused(whole, tmp_path, value):
+    tree = said_by(whole)["tree"]
+    for name in names_within(tree):
+        owner, last = owner_of(tree, name)
+        if isinstance(owner[last], int | float) and isinstance(value, int | float):
+            continue
+
+        def change(described, arrays, name=name):
+            owner, last = owner_of(described["tree"], name)
+            owner[last] = value
+            return said(described, arrays)
+
+        refused(tmp_path / "forged.vlmgrid", forged(whole, change))
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda entry: entry.update(shape=[1, *entry["shape"]]),
+        lambda entry: entry.update(shape=[entry["shape"][0] - 1, *entry["shape"][1:]]),
+        lambda entry: entry.update(dtype="<i2" if entry["dtype"] == "<f4" else "<f4"),
+        lambda entry: entry.update(dtype="O"),
+    ],
+    ids=["more axes", "fewer rows", "other type", "objects"],
+)
+def test_forged_files_with_arrays_of_another_shape_are_refused(whole, tmp_path, edit):
+    for index, entry in enumerate(said_by(whole)["arrays"]):
+        if 0 in entry["shape"]:
+            continue
+
+        def change(described, arrays, index=index):
+            edit(described["arrays"][index])
+            return said(described, arrays)
+
+        refused(tmp_path / "forged.vlmgrid", forged(whole, change))
+
+
+@pytest.mark.parametrize(
+    "body", [b"", b"short", bytes(8), b"\xff" * 64, said([], b""), said({}, b""), said({"tree": 1, "arrays": []}, b"")]
+)
+def test_forged_files_that_say_something_else_are_refused(tmp_path, body):
+    refused(tmp_path / "forged.vlmgrid", with_body(body))
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_forged_indices_are_refused_or_do_no_harm(whole, tmp_path, data):
+    """Whatever stands in the arrays of whole numbers: a grid that is read can be asked and measured."""
+    entries = said_by(whole)["arrays"]
+    index = data.draw(
+        st.sampled_from([i for i, e in enumerate(entries) if e["dtype"][1] in "iu" and 0 not in e["shape"]])
+    )
+    sizes = [int(np.prod(e["shape"])) * np.dtype(e["dtype"]).itemsize for e in entries]
+    start = sum(size + -size % 8 for size in sizes[:index])
+    dtype = np.dtype(entries[index]["dtype"])
+    place = start + dtype.itemsize * data.draw(st.integers(0, sizes[index] // dtype.itemsize - 1))
+    limits = np.iinfo(dtype)
+    value = data.draw(st.integers(max(limits.min, -3), 20) | st.integers(limits.min, limits.max))
+
+    def change(described, arrays):
+        return said(described, arrays[:place] + np.array([value], dtype).tobytes() + arrays[place + dtype.itemsize :])
+
+    path = tmp_path / "forged.vlmgrid"
+    path.write_bytes(forged(whole, change))
+    try:
+        grid = load_light_grid(path, LIGHTS)
+    except InvalidInput:
+        return
+    found = grid.candidates(POINTS.positions)
+    assert len(found.light_offsets) == len(POINTS.positions) + 1
+    assert (found.light_ids < 12).all()
+    assert grid_error(grid, LIGHTS, np.ones((12, 3)), POINTS).full.any()
+    assert grid.occupancy
 
 
 def test_the_same_grid_gives_the_same_bytes(grid, whole, tmp_path):

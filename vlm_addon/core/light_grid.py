@@ -44,6 +44,11 @@ class GridSettings(RangeSettings):
     )
     tolerance: float = setting(0.02, "share", 1e-4, 1.0, "How far irradiance may be from the sum over all lights")
 
+    @property
+    def of_range(self) -> RangeSettings:
+        """Those that count in range mode."""
+        return RangeSettings(self.grid, self.range, self.max_lights)
+
 
 @dataclass(frozen=True)
 class LitTree:
@@ -131,8 +136,9 @@ class LightGrid:
         if not chosen.any():
             return None
         if self.settings.mode == RANGE:
-            of_range = RangeSettings(self.settings.grid, self.settings.range, self.settings.max_lights)
-            return RangeGrid.bake(light_mesh, (self.bounds[0], self.bounds[1]), of_range, progress, chosen)
+            return RangeGrid.bake(
+                light_mesh, (self.bounds[0], self.bounds[1]), self.settings.of_range, progress, chosen
+            )
         step(progress, 0.0, "light tree")
         return build_light_tree(light_mesh, chosen)
 

@@ -13,18 +13,19 @@ import json
 import os
 import struct
 import tempfile
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 
 from .array_codec import flatten, unflatten
 from .errors import InvalidInput
 from .light_grid import RANGE, GridSettings, LightGrid, LitTree
+from .light_grid_layout import require_sound
 from .light_mesh import VirtualLightMesh
 from .range_grid import RangeGrid
-from .surface_points import SurfacePoints
 
 MAGIC = b"VLMGRID\n"
 VERSION = 2
@@ -33,6 +34,9 @@ _HEADER = struct.Struct("<8sIQ32s")
 _TREE_LENGTH = struct.Struct("<Q")
 _ALIGNMENT = 8
 _READ_REMEDY = "bake the grid again, or give a whole file"
+# What reading a body raises that says no light grid.
+_UNREADABLE = (AttributeError, KeyError, IndexError, TypeError, ValueError, OverflowError, RecursionError, struct.error)
+_PLAIN = (int, float, str)
 
 
 def save_light_grid(grid: LightGrid, path: Path | str) -> None:
@@ -69,15 +73,20 @@ def save_light_grid(grid: LightGrid, path: Path | str) -> None:
 def load_light_grid(path: Path | str, light_mesh: VirtualLightMesh) -> LightGrid:
     """The grid that `save_light_grid` wrote, of these very lights.
 
-    Raises InvalidInput, one sentence, for a file that is missing, of another kind or version, cut short or damaged, or
-    of another light mesh.
+    Raises InvalidInput, one sentence, for a file that is missing, of another kind or version, cut short or damaged,
+    whose content is no light grid's, or of another light mesh.
     """
     path = Path(path)
-    grid = _grid(_checked_body(path))
+    body = _checked_body(path)
     try:
+        grid = _grid(body)
         grid.require_made_of(light_mesh)
+        require_sound(grid, light_mesh)
     except InvalidInput as error:
         raise InvalidInput(str(path), error.problem, error.remedy) from None
+    except _UNREADABLE as error:
+        problem = f"its content is not that of a light grid ({type(error).__name__}: {error})"
+        raise InvalidInput(str(path), problem, _READ_REMEDY) from error
     return grid
 
 
@@ -105,7 +114,7 @@ def _checked_body(path: Path) -> memoryview:
 
 
 def _grid(body: memoryview) -> LightGrid:
-    """The grid of a body whose checksum holds, so that what it says can be trusted."""
+    """The grid that a body says, which another program may have written. Raises InvalidInput, or one of _UNREADABLE."""
     (text_length,) = _TREE_LENGTH.unpack_from(body)
     start = _TREE_LENGTH.size
     described = json.loads(bytes(body[start : start + text_length]))
@@ -118,19 +127,30 @@ def _grid(body: memoryview) -> LightGrid:
         size = count * dtype.itemsize
         start += size + -size % _ALIGNMENT
     values: dict[str, Any] = unflatten(described["tree"], arrays)
-    settings = GridSettings(**values["settings"])
+    settings = _made(GridSettings, values["settings"], "settings")
     structure = RangeGrid if settings.mode == RANGE else LitTree
-    for name in ("static", "dynamic"):
-        if values[name] is not None:
-            values[name] = _made(structure, values[name])
-    return LightGrid(**{**values, "settings": settings, "probes": _made(SurfacePoints, values["probes"])})
+    kinds = {name: structure for name in ("static", "dynamic") if values[name] is not None}
+    return cast(LightGrid, _made(LightGrid, values, "light grid", kinds))
 
 
-def _made(kind: Any, tree: dict[str, Any]) -> Any:
-    """The dataclass `kind`, and those within it, from the tree of its fields."""
-    types = get_type_hints(kind)
+def _made(kind: Any, tree: dict[str, Any], name: str, kinds: Mapping[str, Any] | None = None) -> Any:
+    """The dataclass `kind`, and those within it, from the tree of its fields. kinds: of fields that may be several.
+
+    Raises InvalidInput where fields are missing, too many, or of another type.
+    """
+    types = get_type_hints(kind) | dict(kinds or {})
     names = [field.name for field in fields(kind)]
-    return kind(**{name: _made(types[name], tree[name]) if is_dataclass(types[name]) else tree[name] for name in names})
+    if set(tree) != set(names):
+        problem = f"its {name} has the fields {', '.join(sorted(tree))} in place of {', '.join(sorted(names))}"
+        raise InvalidInput("light grid", problem, _READ_REMEDY)
+    made = {}
+    for field in names:
+        of_field, value = types[field], tree[field]
+        made[field] = _made(of_field, value, field) if is_dataclass(of_field) else value
+        if of_field in _PLAIN and not (type(value) is of_field or (of_field is float and type(value) is int)):
+            problem = f"its {field} is {value!r}, which is not of type {of_field.__name__}"
+            raise InvalidInput("light grid", problem, _READ_REMEDY)
+    return kind(**made)
 
 
 def _digest(version: int, body: list[Any]) -> bytes:
