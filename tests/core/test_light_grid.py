@@ -181,6 +181,8 @@ def test_overflow_is_told():
     cells = sum(len(part.occupancy.overflowing_cells) for _, part in grid.structures)
     dropped = sum(len(part.occupancy.dropped_lights) for _, part in grid.structures)
     assert grid.overflow.startswith(f"{cells:,} cells have more than 5 lights; {dropped:,} lights are left out of some")
+    entries = sum(part.occupancy.dropped_entries for _, part in grid.structures)
+    assert f"{entries:,} or" in grid.overflow
 
 
 def test_tags_make_a_tree_but_no_grid_stale():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.render.rooms import box_room, camera_at, lights_from_triangles, quad
+from vlm_addon.core.light_grid import GridSettings, LightGrid
 from vlm_addon.core.light_mesh import VirtualLightMesh, join
 from vlm_addon.core.scene import DIFFUSE, POINT, Float32, Float64, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
@@ -133,6 +134,20 @@ def test_other_settings_build_another_grid(own_device: Device) -> None:
     lights = wall_lights(room, 2)
     for values in ({"grid": 5}, {"grid": 6}, {"grid": 6, "range": 2.0}, {"grid": 6, "range": 2.0, "max_lights": 3}):
         assert built(own_device.render(room, lights, settings(lights="range", **values)))["static_grid"] == 1
+
+
+def test_a_frame_says_which_cells_overflow(device: Device) -> None:
+    room = box_room()
+    lights = join([wall_lights(room, 2), turning_lights(0.0)])
+    frame = device.render(room, lights, settings(lights="range", grid=5, max_lights=3))
+    grid = LightGrid.bake(lights, room.bounds(), GridSettings(mode="range", grid=5, max_lights=3))
+    full = [part.occupancy for _, part in grid.structures]
+    assert frame.counters["overflowing_cells"] == sum(len(part.overflowing_cells) for part in full) > 0
+    assert frame.counters["dropped_entries"] == sum(part.dropped_entries for part in full) > 0
+    assert frame.reasons == (f"light is missing: {grid.overflow}",)
+    roomy = device.render(room, lights, settings(lights="range", grid=5))
+    assert roomy.counters["overflowing_cells"] == roomy.counters["dropped_entries"] == 0
+    assert roomy.reasons == ()
 
 
 def test_few_lights_are_summed_and_the_frame_says_why(device: Device) -> None:

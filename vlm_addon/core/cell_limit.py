@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -45,6 +45,20 @@ class Occupancy:
     def dropped_lights(self) -> npt.NDArray[Any]:
         """(m,) int64: lights that some cell leaves out though they reach it, ascending."""
         return np.flatnonzero(self.cells_dropped_from)
+
+
+def overflow_text(occupancies: Sequence[Occupancy], max_lights: int) -> str:
+    """How many cells of grids have more lights than fit, and how many lights they leave out; "" if none does."""
+    cells = sum(len(occupancy.overflowing_cells) for occupancy in occupancies)
+    if not cells:
+        return ""
+    lights = sum(len(occupancy.dropped_lights) for occupancy in occupancies)
+    dropped = sum(occupancy.dropped_entries for occupancy in occupancies)
+    share = dropped / (dropped + sum(occupancy.entries for occupancy in occupancies))
+    return (
+        f"{cells:,} cells have more than {max_lights:,} lights; {lights:,} lights are left out of some, {dropped:,} or"
+        f" {share:.1%} of all entries"
+    )
 
 
 def limited(

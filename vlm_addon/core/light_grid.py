@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .array_codec import content_hash
+from .cell_limit import overflow_text
 from .errors import InvalidInput
 from .grid_frame import Bounds, as_numbers, finite_bounds, finite_points
 from .light_clusters import LightClusters, light_clusters
@@ -190,17 +191,7 @@ class LightGrid:
     def overflow(self) -> str:
         """How many cells have no room for all their lights, and how many lights they leave out; "" if none does."""
         full = [part.occupancy for _, part in self.structures if isinstance(part, RangeGrid)]
-        cells = sum(len(occupancy.overflowing_cells) for occupancy in full)
-        if not cells:
-            return ""
-        lights = sum(len(occupancy.dropped_lights) for occupancy in full)
-        most = self.settings.max_lights
-        dropped = sum(occupancy.dropped_entries for occupancy in full)
-        share = dropped / (dropped + sum(occupancy.entries for occupancy in full))
-        return (
-            f"{cells:,} cells have more than {most:,} lights; {lights:,} lights are left out of some, {share:.1%} of"
-            " all entries"
-        )
+        return overflow_text(full, self.settings.max_lights)
 
     def candidates(self, points: npt.ArrayLike) -> Candidates:
         """What lights (p, 3) points, m. Raises InvalidInput for another shape or points that are not finite.

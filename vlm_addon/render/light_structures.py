@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from ..core.active_hemisphere import HalfBalls
 from ..core.array_codec import content_hash
+from ..core.cell_limit import Occupancy
 from ..core.grid_frame import Bounds, GridFrame, make_frame
 from ..core.light_clusters import light_clusters
 from ..core.light_grid import LitTree
@@ -99,7 +100,7 @@ class LightStructures:
                 if self._on_device:
                     return _grid_on_device(context, shaders, light_mesh, bounds, settings, chosen, progress)
                 grid = RangeGrid.bake(light_mesh, bounds, settings, progress, chosen)
-                return gpu_grid(context, grid.frame, grid.half_balls, upload(context, grid.lists))
+                return gpu_grid(context, grid.frame, grid.half_balls, upload(context, grid.lists), grid.occupancy)
 
             result.append(self._kept.get(f"{kind}_grid", key, build))
         return result
@@ -133,14 +134,21 @@ def _grid_on_device(
     frame = make_frame(bounds, settings.grid)
     shapes = light_shapes(light_mesh, frame, settings.range, chosen)
     lists = LightGridPass(context, shaders).build(shapes.half_balls, frame.edges, progress)
+    occupancy = None
     if settings.max_lights:
         grid = RangeGrid.from_lists(settings, frame, shapes, lists.read(), progress)
-        lists = upload(context, grid.lists)
-    return gpu_grid(context, frame, shapes.half_balls, lists)
+        lists, occupancy = upload(context, grid.lists), grid.occupancy
+    return gpu_grid(context, frame, shapes.half_balls, lists, occupancy)
 
 
-def gpu_grid(context: moderngl.Context, frame: GridFrame, half_balls: HalfBalls, lists: GpuBlockLists) -> GpuRangeGrid:
-    """A grid whose lists are on the device already."""
+def gpu_grid(
+    context: moderngl.Context,
+    frame: GridFrame,
+    half_balls: HalfBalls,
+    lists: GpuBlockLists,
+    occupancy: Occupancy | None = None,
+) -> GpuRangeGrid:
+    """A grid whose lists are on the device already; occupancy: as in GpuRangeGrid."""
     offsets = np.frombuffer(lists.offsets.read(), np.uint32).astype(np.int64)
     records = context.buffer(half_ball_records(half_balls).tobytes())
-    return GpuRangeGrid(frame, lists, records, int(np.diff(offsets).max(initial=0)))
+    return GpuRangeGrid(frame, lists, records, int(np.diff(offsets).max(initial=0)), occupancy)

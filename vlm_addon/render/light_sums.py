@@ -6,6 +6,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
+from ..core.cell_limit import Occupancy, overflow_text
 from ..core.progress import Progress
 from ..core.range_grid import RangeSettings
 from .light_forest import GpuLightForest, make_forest
@@ -39,6 +40,10 @@ class LightSum(ABC):
     @abstractmethod
     def counters(self) -> dict[str, float]:
         """What was counted so far."""
+
+    def reasons(self) -> list[str]:
+        """Why light is missing in it, a sentence each."""
+        return []
 
 
 class FullSum(LightSum):
@@ -99,6 +104,7 @@ class CellSum(LightSum):
         self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer, settings: RangeSettings
     ) -> None:
         super().__init__(scene, lights, radiosity)
+        self._max_lights = settings.max_lights
         self._pass = RangePhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
         assert scene.world_lights is not None
         with scene.timer.measure("light grid"):
@@ -112,5 +118,18 @@ class CellSum(LightSum):
         return self._pass.render(gbuffer, self.lights, self.radiosity, self._grids, space, bounds, progress)
 
     def counters(self) -> dict[str, float]:
-        """Pairs of a light and a block of cells in the grids' lists."""
-        return {"lists_entries": sum(grid.lists.pairs for grid in self._grids)}
+        """lists_entries: pairs of a light and a block of cells in the grids' lists. The others are of full cells."""
+        return {
+            "lists_entries": sum(grid.lists.pairs for grid in self._grids),
+            "overflowing_cells": sum(len(occupancy.overflowing_cells) for occupancy in self._occupancies),
+            "dropped_entries": sum(occupancy.dropped_entries for occupancy in self._occupancies),
+        }
+
+    def reasons(self) -> list[str]:
+        """Which cells are too full for their lights."""
+        overflow = overflow_text(self._occupancies, self._max_lights)
+        return [f"light is missing: {overflow}"] if overflow else []
+
+    @property
+    def _occupancies(self) -> list[Occupancy]:
+        return [grid.occupancy for grid in self._grids if grid.occupancy is not None]

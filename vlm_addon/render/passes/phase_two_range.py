@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...core.cell_limit import Occupancy
 from ...core.grid_frame import Bounds, GridFrame
 from ...core.progress import Progress, step
 from ..gpu_layout import HALF_BALL
@@ -35,12 +36,16 @@ FACE_SLACK = 1e-5
 
 @dataclass(frozen=True)
 class GpuRangeGrid:
-    """A grid of range mode on the device. half_balls: records of HALF_BALL. longest: lights of the fullest block."""
+    """A grid of range mode on the device. half_balls: records of HALF_BALL. longest: lights of the fullest block.
+
+    occupancy: None where it was not counted, since cells hold any number of lights.
+    """
 
     frame: GridFrame
     lists: GpuBlockLists
     half_balls: moderngl.Buffer
     longest: int
+    occupancy: Occupancy | None
 
     @property
     def light_count(self) -> int:

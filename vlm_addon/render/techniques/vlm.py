@@ -95,7 +95,7 @@ class VirtualLightMeshTechnique(Technique):
         return {"virtual_lights": self._lights.count, **self._built, **self._sum.counters()}
 
     def reasons(self) -> list[str]:
-        """Why all lights are summed where a tolerance was asked for."""
+        """Why all lights are summed where a tolerance was asked for, and why light is missing with a range."""
         if self.chosen.lights != TOLERANCE or not isinstance(self._sum, FullSum):
-            return []
+            return self._sum.reasons()
         return [f"all {self._lights.count} virtual lights are summed: that costs no more than clusters of so few"]
