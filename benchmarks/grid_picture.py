@@ -16,13 +16,13 @@ import numpy as np
 from PIL import Image
 
 from benchmarks.support import displayed, open_sample, rgb
+from vlm_addon.core.light_grid import FEW_LIGHTS
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.scene import SceneSnapshot
 from vlm_addon.core.simplify import subdivide_light_mesh
 from vlm_addon.measure.contact_sheet import error_map, side_by_side
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.techniques.vlm import FEW_LIGHTS
 from vlm_addon.terminal import table
 
 SCENE = "cornell_box"

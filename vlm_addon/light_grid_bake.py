@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid, nominal_radiosity
+from .core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings, LightGrid, nominal_radiosity
 from .core.light_grid_error import GridError, grid_error
 from .core.light_mesh import VirtualLightMesh, empty_light_mesh
 from .core.light_scale import PROBES
@@ -23,6 +23,8 @@ SUBJECT = "light grid"
 # Pairs of a point and a light that the full sum may take: some seconds on one core.
 _PAIRS = 2_000_000
 _FEWEST_POINTS, _MOST_POINTS = 50, 1000
+NOTICEABLE_LOSS = GridSettings.tolerance
+"""Share of the irradiance that a range may leave out unsaid: what the other mode may be off by if nothing is set."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,14 @@ class GridBake:
             "occupancy": self.grid.occupancy,
             "points": len(self.error.point_errors),
             "point_error": self.error.percentiles(),
+            "all_lights_summed": self.all_lights_summed,
             **self._dropped(),
         }
+
+    @property
+    def all_lights_summed(self) -> bool:
+        """Whether renderers sum all lights in place of its clusters, since there are so few."""
+        return self.grid.settings.mode == TOLERANCE and self.grid.light_count <= FEW_LIGHTS
 
     def _dropped(self) -> dict[str, Any]:
         """What range mode leaves out."""
@@ -66,24 +74,43 @@ class GridBake:
         settings, errors = self.grid.settings, self.error.percentiles()
         asked = {TOLERANCE: f"tolerance {settings.tolerance:g}", RANGE: f"range {settings.range:g}"}[settings.mode]
         seen = ", ".join(f"{name} {error:.2%}" for name, error in errors.items())
+        unused = f"; renderers sum all of so few lights ({self.grid.light_count})" if self.all_lights_summed else ""
         return (
             f"light grid, {asked}: {1e-6 * self.grid.nbytes:.2f} MB in {self.seconds:.2f} s; point error under even "
-            f"light: {seen}"
+            f"light: {seen}{unused}"
         )
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Where the grid does not do what its settings say."""
-        settings, errors = self.grid.settings, self.error.percentiles()
+        """Where the grid does not do what its settings say, and what a range leaves out."""
+        return (*self._tolerance_findings(), *self._range_findings())
+
+    def _tolerance_findings(self) -> list[Finding]:
+        """Of so few lights that all are summed, none: renderers use no clusters."""
+        tolerance, errors = self.grid.settings.tolerance, self.error.percentiles()
+        if self.grid.settings.mode != TOLERANCE or self.all_lights_summed:
+            return []
+        seen = [
+            f"{errors[name]:.1%} or more at {others} of the points, where {most:.1%} is allowed"
+            for name, others, most in (("95 %", "5 %", tolerance), ("99.9 %", "0.1 %", 3.0 * tolerance))
+            if errors[name] > most
+        ]
+        if not seen:
+            return []
+        problem = f"its irradiance is off by {' and by '.join(seen)} (tolerance {tolerance:.1%})"
+        return [Finding(SUBJECT, problem, "set a smaller tolerance, or sum all lights")]
+
+    def _range_findings(self) -> list[Finding]:
         found = []
-        if settings.mode == TOLERANCE and errors["95 %"] > settings.tolerance:
-            seen = f"{errors['95 %']:.1%} or more at 5 % of the points"
-            problem = f"its irradiance is off by {seen}, the tolerance is {settings.tolerance:.1%}"
-            found.append(Finding(SUBJECT, problem, "set a smaller tolerance, or sum all lights"))
+        if self.grid.settings.mode == RANGE and self.error.share_out_of_range > NOTICEABLE_LOSS:
+            share = f"{self.error.share_out_of_range:.1%} of the irradiance"
+            problem = f"{share} comes from lights beyond their range of {self.grid.settings.range:g}"
+            problem += " and is left out, which is the nature of range mode"
+            found.append(Finding(SUBJECT, problem, "use a tolerance, which leaves nothing out, or a larger range"))
         if self.grid.overflow:
             problem = f"{self.grid.overflow}; {self.error.share_overflowed:.1%} of the irradiance is lost with them"
             found.append(Finding(SUBJECT, problem, "allow more lights in a cell, or use a smaller range or more cells"))
-        return tuple(found)
+        return found
 
 
 def bake_light_grid(

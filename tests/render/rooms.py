@@ -106,3 +106,13 @@ def mesh_lights(meshes: Sequence[Mesh], **values: npt.ArrayLike) -> VirtualLight
     corners = np.concatenate([mesh.positions[mesh.triangles] for mesh in meshes])
     tag_ids = np.concatenate([mesh.tag_ids for mesh in meshes])
     return lights_from_triangles(corners, tag_ids=tag_ids, **values)
+
+
+def split(corners: Float64, times: int) -> Float64:
+    """(4^times n, 3, 3): each of (n, 3, 3) triangles as four, by the midpoints of its edges, `times` over."""
+    for _ in range(times):
+        a, b, c = np.moveaxis(corners, 1, 0)
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return corners

@@ -9,27 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.render.rooms import box_room, camera_at, lights_from_triangles, quad
-from vlm_addon.core.light_grid import GridSettings, LightGrid
+from tests.render.rooms import box_room, camera_at, lights_from_triangles, quad, split
+from vlm_addon.core.light_grid import FEW_LIGHTS, GridSettings, LightGrid
 from vlm_addon.core.light_mesh import VirtualLightMesh, join
 from vlm_addon.core.scene import DIFFUSE, POINT, Float32, Float64, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.passes.tile_bounds import TILE_SIDE
-from vlm_addon.render.techniques.vlm import FEW_LIGHTS
 
 TREES = ("static_tree", "dynamic_tree", "static_clusters", "dynamic_clusters")
 PAGE = 4096
-
-
-def split(corners: Float64, times: int) -> Float64:
-    """Each triangle as four, `times` over."""
-    for _ in range(times):
-        a, b, c = np.moveaxis(corners, 1, 0)
-        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
-    return corners
 
 
 def wall_lights(snapshot: SceneSnapshot, times: int = 4) -> VirtualLightMesh:

@@ -30,6 +30,9 @@ from .settings import setting
 from .surface_points import NO_POINTS, SurfacePoints
 
 TOLERANCE, RANGE = "tolerance", "range"
+FEW_LIGHTS = 400
+"""Renderers sum up to so many lights one by one: that costs about what clusters do, measured up to 160 in a box and 600
+in the atrium."""
 
 Bools = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]

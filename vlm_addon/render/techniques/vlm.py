@@ -7,7 +7,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ...core.light_grid import GridSettings
+from ...core.light_grid import FEW_LIGHTS, GridSettings
 from ...core.range_grid import RangeSettings
 from ...core.settings import setting
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import moderngl
 
 TOLERANCE, RANGE, ALL = "tolerance", "range", "all"
-FEW_LIGHTS = 400
-"""Up to so many, all lights cost about what clusters do: measured up to 160 in a box, 600 in the atrium."""
 
 
 def _of_grid(name: str, only_with: str) -> Any:
