@@ -118,6 +118,15 @@ def test_a_grid_of_static_lights_is_kept_when_a_mesh_moves(own_device: Device) -
     assert built(frame(2.5)) == {"static_grid": 0, "dynamic_grid": 0}
 
 
+def test_other_tags_build_a_tree_but_no_grid(own_device: Device) -> None:
+    room, lights = box_room(), wall_lights(box_room())
+    tagged = replace(lights, tag_ids=np.arange(len(lights), dtype=np.int32) % 2)
+    for mode, anew in (("range", 0), ("tolerance", 1)):
+        kind = {"range": "static_grid", "tolerance": "static_tree"}[mode]
+        assert built(own_device.render(room, lights, settings(lights=mode, grid=4)))[kind] == 1
+        assert built(own_device.render(room, tagged, settings(lights=mode, grid=4)))[kind] == anew
+
+
 def test_other_settings_build_another_grid(own_device: Device) -> None:
     room = box_room()
     lights = wall_lights(room, 2)

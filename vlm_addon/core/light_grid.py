@@ -30,6 +30,7 @@ from .settings import setting
 from .surface_points import NO_POINTS, SurfacePoints
 
 TOLERANCE, RANGE = "tolerance", "range"
+STATIC, DYNAMIC = "static", "dynamic"
 FEW_LIGHTS = 400
 """Renderers sum up to so many lights one by one: that costs about what clusters do, measured up to 160 in a box and 600
 in the atrium."""
@@ -129,7 +130,7 @@ class LightGrid:
         old = ((self.static, self.static_hash), (self.dynamic, self.dynamic_hash))
         made: list[Structure | None] = []
         hashes = []
-        for (structure, old_hash), chosen in zip(old, (~light_mesh.dynamic, light_mesh.dynamic), strict=True):
+        for (structure, old_hash), chosen in zip(old, chosen_lights(light_mesh).values(), strict=True):
             hashes.append(lights_hash(light_mesh, chosen, self.settings.mode))
             kept = hashes[-1] == old_hash
             made.append(_unlit(structure) if kept else self._built(light_mesh, chosen, progress))
@@ -172,8 +173,8 @@ class LightGrid:
 
     @property
     def structures(self) -> list[tuple[str, RangeGrid | LitTree]]:
-        """("static" or "dynamic", structure) of those that hold lights."""
-        both = (("static", self.static), ("dynamic", self.dynamic))
+        """(STATIC or DYNAMIC, structure) of those that hold lights."""
+        both = ((STATIC, self.static), (DYNAMIC, self.dynamic))
         return [(name, structure) for name, structure in both if structure is not None]
 
     @property
@@ -218,9 +219,7 @@ class LightGrid:
 
     def require_made_of(self, light_mesh: VirtualLightMesh) -> None:
         """Raises InvalidInput unless the grid was baked from these very lights."""
-        hashes = [
-            lights_hash(light_mesh, chosen, self.settings.mode) for chosen in (~light_mesh.dynamic, light_mesh.dynamic)
-        ]
+        hashes = [lights_hash(light_mesh, chosen, self.settings.mode) for chosen in chosen_lights(light_mesh).values()]
         if hashes != [self.static_hash, self.dynamic_hash]:
             problem = f"it was baked from {self.light_count:,} other lights or other shapes of them"
             raise InvalidInput("light grid", problem, "bake it again")
@@ -248,6 +247,11 @@ def usable_radiosity(light_mesh: VirtualLightMesh, radiosity: npt.ArrayLike) -> 
                 f"radiosity of light {row}", f"{values[row]} {problem}", "give finite values of at least 0"
             )
     return values
+
+
+def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, Bools]:
+    """(n,) bool by STATIC and DYNAMIC: the lights of each kind."""
+    return {STATIC: ~light_mesh.dynamic, DYNAMIC: light_mesh.dynamic}
 
 
 def lights_hash(light_mesh: VirtualLightMesh, chosen: Bools, mode: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InvalidInput
-from .light_grid import LightGrid, LitTree
+from .light_grid import LightGrid, LitTree, chosen_lights
 from .light_mesh import VirtualLightMesh
 from .light_tree import ROOT, LightTree
 from .range_grid import RangeGrid
@@ -57,8 +57,8 @@ def require_sound(grid: LightGrid, light_mesh: VirtualLightMesh) -> None:
     """Raises InvalidInput where arrays do not fit each other or the light mesh."""
     _require_shapes(grid, _COMMON, {}, "")
     _require(grid.light_count == len(light_mesh), "light_count")
-    parts = (("static", grid.static, ~light_mesh.dynamic), ("dynamic", grid.dynamic, light_mesh.dynamic))
-    for name, part, chosen in parts:
+    parts = (grid.static, grid.dynamic)
+    for (name, chosen), part in zip(chosen_lights(light_mesh).items(), parts, strict=True):
         _require((part is not None) == chosen.any(), name)
         if isinstance(part, RangeGrid):
             _require(part.settings == grid.settings.of_range, f"{name}.settings")

@@ -18,7 +18,7 @@ from ..core.array_codec import content_hash
 from ..core.cell_limit import Occupancy
 from ..core.grid_frame import Bounds, GridFrame, make_frame
 from ..core.light_clusters import light_clusters
-from ..core.light_grid import LitTree
+from ..core.light_grid import RANGE, STATIC, TOLERANCE, LitTree, chosen_lights, lights_hash
 from ..core.light_mesh import VirtualLightMesh
 from ..core.light_scale import PROBES, mean_irradiance
 from ..core.light_tree import LightTree, build_light_tree
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     import moderngl
 
 Bools = npt.NDArray[np.bool_]
-
-STATIC, DYNAMIC = "static", "dynamic"
 
 
 class LightStructures:
@@ -59,7 +57,7 @@ class LightStructures:
         trees: dict[str, LightTree] = {}
         for kind, chosen in chosen_lights(light_mesh).items():
             if chosen.any():
-                shapes[kind] = shape_hash(light_mesh, chosen)
+                shapes[kind] = lights_hash(light_mesh, chosen, TOLERANCE)
                 build = partial(build_light_tree, light_mesh, chosen)
                 trees[kind] = self._kept.get(f"{kind}_tree", shapes[kind], build)
         probes = random_surface_points(snapshot.meshes, PROBES)
@@ -94,7 +92,7 @@ class LightStructures:
             if not chosen.any():
                 continue
             bounds = _bounds(snapshot, kind == STATIC)
-            key = f"{shape_hash(light_mesh, chosen)} {content_hash([list(bounds), settings])}"
+            key = f"{lights_hash(light_mesh, chosen, RANGE)} {content_hash([list(bounds), settings])}"
 
             def build(chosen: Bools = chosen, bounds: Bounds = bounds) -> GpuRangeGrid:
                 if self._on_device:
@@ -104,16 +102,6 @@ class LightStructures:
 
             result.append(self._kept.get(f"{kind}_grid", key, build))
         return result
-
-
-def chosen_lights(light_mesh: VirtualLightMesh) -> dict[str, Bools]:
-    """(n,) bool by kind of light."""
-    return {STATIC: ~light_mesh.dynamic, DYNAMIC: light_mesh.dynamic}
-
-
-def shape_hash(light_mesh: VirtualLightMesh, chosen: Bools) -> str:
-    """Hash of all that a structure over the `chosen` lights depends on."""
-    return content_hash([chosen, light_mesh.corners[chosen], light_mesh.tag_ids[chosen]])
 
 
 def _bounds(snapshot: SceneSnapshot, only_static: bool) -> Bounds:

@@ -7,7 +7,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ...core.light_grid import FEW_LIGHTS, GridSettings
+from ...core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings
 from ...core.range_grid import RangeSettings
 from ...core.settings import setting
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
@@ -18,7 +18,7 @@ from ..virtual_lights import GpuVirtualLights
 if TYPE_CHECKING:
     import moderngl
 
-TOLERANCE, RANGE, ALL = "tolerance", "range", "all"
+ALL = "all"
 
 
 def _of_grid(name: str, only_with: str) -> Any:
