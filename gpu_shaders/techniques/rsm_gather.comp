@@ -19,6 +19,8 @@ layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²; w: what bound
 uniform uint first_tap, end_tap;
 uniform float tap_share;    // one over the number of taps
 uniform float area_share;   // one over that of all pictures: in their mean a tap stands for so much of the surface
+uniform float map_scale;    // with the offset takes a pixel's place into the space of the map
+uniform vec3 map_offset;
 uniform float radius;       // of the disc; 1 reaches all of the map from everywhere
 uniform int side;           // texels along a face
 uniform bool is_last;       // run of the picture
@@ -30,7 +32,7 @@ void main() {
         return;
     }
     Lamp lamp = lamps[0];
-    vec3 p = texelFetch(gbuffer_position, pixel, 0).xyz;
+    vec3 p = map_scale * texelFetch(gbuffer_position, pixel, 0).xyz + map_offset;
     vec3 n = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
 #if IS_CUBE
     // The map is the sphere in Lambert's equal-area projection about the pixel: of radius 1, as large as 4 pi.

@@ -8,11 +8,12 @@ import numpy as np
 from vlm_addon.core.progress import silent
 from vlm_addon.core.scene import Float64, SceneSnapshot
 from vlm_addon.render.device import Device
-from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.local_space import LocalSpace
 from vlm_addon.render.passes.gbuffer import GBuffer
 from vlm_addon.render.passes.rsm import LampReflections
 from vlm_addon.render.techniques.rsm_gather import UNBIASED, GatherPass, sample_taps
 
+WORLD_SPACE = LocalSpace(np.zeros(3), 1.0)
 COLUMNS = 64
 """Points come in multiples of this many: one a pixel, so many in a row."""
 
@@ -43,10 +44,9 @@ def gathered(
 ) -> Float64:
     """(p, 4): irradiance, and what bounds took off, of one picture."""
     with device.current() as context:
-        geometry = GpuGeometry(context, room, np.zeros(3))
-        maps = LampReflections(context, device.shaders, geometry, room.lights, 128, 4)
+        maps = LampReflections(context, device.shaders, device.kept, room, 128, 4)
         gather = GatherPass(context, device.shaders, COLUMNS, len(points) // COLUMNS)
         gbuffer = picture_of(device, points, normals)
         taps = sample_taps(samples, 0, weight)
-        found = gather.render(gbuffer, maps.maps(), len(maps), taps, pictures, radius, silent)
+        found = gather.render(gbuffer, WORLD_SPACE, maps.maps(), len(maps), taps, pictures, radius, silent)
         return np.frombuffer(found.read(), np.float32).reshape(-1, 4).astype(float)

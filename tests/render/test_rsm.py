@@ -17,6 +17,7 @@ from vlm_addon.core.lamps import lamp_irradiance, spot_attenuation
 from vlm_addon.core.scene import AREA, DIFFUSE, POINT, PRINCIPLED, SPOT, SUN, Float64, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.kept import Kept
 from vlm_addon.render.passes import rsm
 from vlm_addon.render.passes.rsm import LampReflections, ReflectiveShadowMap, ReflectiveShadowMapPass
 
@@ -49,9 +50,8 @@ def sent_share(light: Light) -> float:
 def total_flux(device: Device, snapshot: SceneSnapshot, count: int = 1, resolution: int = RESOLUTION) -> Float64:
     """(3,) W: over all maps of all lamps."""
     with device.current() as context:
-        geometry = GpuGeometry(context, snapshot)
-        maps = LampReflections(context, device.shaders, geometry, snapshot.lights, resolution, count)
-        return np.sum([found.total_flux() for found in maps.maps()] + [np.zeros(3)], axis=0)
+        maps = LampReflections(context, device.shaders, Kept(), snapshot, resolution, count)
+        return np.sum([found.total_flux() * found.space.unit**2 for found in maps.maps()] + [np.zeros(3)], axis=0)
 
 
 def one_map(
@@ -223,8 +223,7 @@ def test_ten_lamps_add_up_and_dark_ones_have_no_map(device: Device) -> None:
     room = empty_room([*lamps, dark], GREY)
     np.testing.assert_allclose(total_flux(device, room), np.array(GREY[0]) * (45.0, 10.0, 20.0), rtol=0.005)
     with device.current() as context:
-        geometry = GpuGeometry(context, room)
-        maps = LampReflections(context, device.shaders, geometry, room.lights, RESOLUTION, 4)
+        maps = LampReflections(context, device.shaders, Kept(), room, RESOLUTION, 4)
         for _ in range(3):
             assert len(list(maps.maps())) == len(maps) == 10
         assert maps.drawn == 10
@@ -238,9 +237,10 @@ def test_maps_beyond_the_cache_are_drawn_again_and_are_the_same(
     kept = total_flux(device, room, 2)
     monkeypatch.setattr(rsm, "CACHE_BYTES", 0)
     with device.current() as context:
-        maps = LampReflections(context, device.shaders, GpuGeometry(context, room), room.lights, RESOLUTION, 2)
+        maps = LampReflections(context, device.shaders, Kept(), room, RESOLUTION, 2)
         for _ in range(2):
-            assert (np.sum([found.total_flux() for found in maps.maps()], axis=0) == kept).all()
+            found = [found.total_flux() * found.space.unit**2 for found in maps.maps()]
+            assert (np.sum(found, axis=0) == kept).all()
         assert maps.drawn == 8
 
 
@@ -299,8 +299,7 @@ def test_distant_lamps_see_the_scene_as_sharply_as_near_ones(device: Device, lam
 def test_extreme_lamps_give_finite_flux_and_no_more_than_they_send(device: Device, light: Light) -> None:
     room = empty_room([light], GREY)
     with device.current() as context:
-        geometry = GpuGeometry(context, room)
-        for found in LampReflections(context, device.shaders, geometry, room.lights, RESOLUTION, 4).maps():
+        for found in LampReflections(context, device.shaders, Kept(), room, RESOLUTION, 4).maps():
             for texture in (found.position, found.normal, found.flux):
                 assert np.isfinite(texels(texture)).all()
             assert (found.flux_level(0) >= 0.0).all()

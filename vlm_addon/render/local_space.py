@@ -34,7 +34,7 @@ class LocalSpace:
     def scene(self, snapshot: SceneSnapshot) -> SceneSnapshot:
         """`snapshot` with everything that has a place or a length in local units."""
         meshes = tuple(replace(mesh, positions=self.local_points(mesh.positions)) for mesh in snapshot.meshes)
-        lights = tuple(self._light(light) for light in snapshot.lights)
+        lights = tuple(self.light(light) for light in snapshot.lights)
         camera = self._camera(snapshot.camera) if snapshot.camera is not None else None
         return replace(snapshot, meshes=meshes, lights=lights, camera=camera)
 
@@ -51,7 +51,12 @@ class LocalSpace:
         """(..., 3) local points of `points` in world space."""
         return (points - self.origin) / self.unit
 
-    def _light(self, light: Light) -> Light:
+    def to(self, other: LocalSpace) -> tuple[float, Float64]:
+        """Scale and (3,) offset that take a point of this space into `other`: scale * point + offset."""
+        return self.unit / other.unit, (self.origin - other.origin) / other.unit
+
+    def light(self, light: Light) -> Light:
+        """`light` in local units."""
         x, y, z = self.local_points(np.array(light.position, np.float64)).tolist()
         red, green, blue = light.power
         # Irradiance falls with the square of a distance; a sun's is given.

@@ -4,19 +4,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...core.array_codec import content_hash
 from ...core.lamps import LampSample, lamp_samples
-from ...core.scene import AREA, Float32, Float64, Light
+from ...core.scene import AREA, Float32, Float64, Light, SceneSnapshot
 from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..geometry import GpuGeometry
 from ..gpu_layout import CONSTANTS, LAMP
+from ..kept import Kept
 from ..lamp_records import lamp_record
+from ..lamp_scenes import LampScene, LampScenes
+from ..local_space import LocalSpace
 from ..rsm_views import FaceView, face_views, map_tiles
 from ..shader_library import ShaderLibrary, set_uniforms
 from .gbuffer import GBufferPass
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
 LEAST_FACE = 8
 MIP_GROUP_SIDE = 8
 CACHE_BYTES = 1 << 29
-"""Of maps that are kept for all pictures of a frame; those beyond are drawn for each."""
+"""Of maps that are kept; those beyond are drawn for each picture."""
 BYTES_PER_TEXEL = 54
 """Three images of 16 bytes, a third more for the mip levels of one."""
 CHANNELS = 3
@@ -48,6 +52,7 @@ class MapTextures:
 class ReflectiveShadowMap:
     """What one sample of a lamp sees, and reflects of its share of the lamp; textures of RGBA32F, unfiltered.
 
+    All is in local units of `space`, which is not the frame's: `space` says how to take places into that or back.
     position: m from the local origin, and depth along the face's axis in m. normal: unit shading normal on the lamp's
     side, and the area in m² that the texel covers. flux: W, and the texel's part of the map: sr of a cube's map, else
     share of the map; 0 in faces that are not drawn. Its mip levels are sums, down to one texel a face. Where the lamp
@@ -55,12 +60,26 @@ class ReflectiveShadowMap:
     the shadow_* fields of this map. side: texels along a face. brightest: (3,) W/m², the greatest radiosity in it.
     """
 
-    position: moderngl.Texture
-    normal: moderngl.Texture
-    flux: moderngl.Texture
+    textures: MapTextures
     record: np.ndarray
     side: int
     brightest: Float32
+    space: LocalSpace = field(default_factory=lambda: LocalSpace(np.zeros(3), 1.0))
+
+    @property
+    def position(self) -> moderngl.Texture:
+        """Place and depth of what is in each texel."""
+        return self.textures.position
+
+    @property
+    def normal(self) -> moderngl.Texture:
+        """Normal and area of what is in each texel."""
+        return self.textures.normal
+
+    @property
+    def flux(self) -> moderngl.Texture:
+        """What each texel reflects, and its part of the map."""
+        return self.textures.flux
 
     @property
     def levels(self) -> int:
@@ -97,7 +116,7 @@ def map_points(light: Light, count: int) -> tuple[LampSample, ...]:
 
 
 class ReflectiveShadowMapPass:
-    """Draws reflective shadow maps of lamps of every kind. drawn: maps so far."""
+    """Draws reflective shadow maps of lamps of every kind. face: texels along a cube's face. drawn: maps so far."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
         """resolution: texels along a cube's face, taken to the nearest power of two; a map of one tile has twice as
@@ -105,7 +124,7 @@ class ReflectiveShadowMapPass:
         self._context = context
         self._shaders = shaders
         most = int(context.info["GL_MAX_TEXTURE_SIZE"]) // 4
-        self._face = 1 << round(math.log2(min(max(resolution, LEAST_FACE), most)))
+        self.face = 1 << round(math.log2(min(max(resolution, LEAST_FACE), most)))
         self._gbuffers: dict[int, GBufferPass] = {}
         self._albedo = AlbedoTexture(context)
         self._resolve = FullscreenPass(context, shaders, "passes/rsm.frag")
@@ -116,7 +135,7 @@ class ReflectiveShadowMapPass:
 
     def side(self, geometry: GpuGeometry, light: Light) -> int:
         """Texels along a face of the maps of `light`."""
-        face = self._face if map_tiles(light, geometry) != (1, 1) else self._face * SINGLE_TILE_FACTOR
+        face = self.face if map_tiles(light, geometry) != (1, 1) else self.face * SINGLE_TILE_FACTOR
         return max(face // SOFT_DIVISOR, LEAST_FACE) if light.kind == AREA else face
 
     def size(self, geometry: GpuGeometry, light: Light) -> tuple[int, int]:
@@ -164,7 +183,7 @@ class ReflectiveShadowMapPass:
         self._sum_up(target, side)
         self.drawn += 1
         brightest = np.frombuffer(self._brightest.read(), np.float32).copy()
-        return ReflectiveShadowMap(target.position, target.normal, target.flux, record, side, brightest)
+        return ReflectiveShadowMap(target, record, side, brightest)
 
     def _draw(self, target: MapTextures, geometry: GpuGeometry, face: FaceView, side: int, sample_index: int) -> None:
         if side not in self._gbuffers:
@@ -192,65 +211,139 @@ class ReflectiveShadowMapPass:
             self._context.memory_barrier()
 
 
+class KeptMaps:
+    """Maps that a device keeps over frames, by what they depend on."""
+
+    def __init__(self) -> None:
+        self._maps: dict[str, ReflectiveShadowMap] = {}
+        self._spare: dict[tuple[int, int], list[MapTextures]] = {}
+
+    def keep_only(self, keys: Collection[str]) -> None:
+        """Lets go of all other maps; their textures are drawn into again until `drop_spare`."""
+        for key in [key for key in self._maps if key not in keys]:
+            textures = self._maps.pop(key).textures
+            self._spare.setdefault(textures.flux.size, []).append(textures)
+
+    def drop_spare(self) -> None:
+        """Lets go of the textures of maps that are no longer kept."""
+        self._spare.clear()
+
+    def spare(self, size: tuple[int, int]) -> MapTextures | None:
+        """Textures of that size whose map is no longer kept, if there are any."""
+        found = self._spare.get(size)
+        return found.pop() if found else None
+
+    def get(self, key: str) -> ReflectiveShadowMap | None:
+        """The map of that key, if it is kept."""
+        return self._maps.get(key)
+
+    def add(self, key: str, found: ReflectiveShadowMap) -> None:
+        """Keeps a map."""
+        self._maps[key] = found
+
+    @property
+    def nbytes(self) -> int:
+        """Of all maps, on the device."""
+        return sum(map_bytes(found.flux.size) for found in self._maps.values())
+
+
+def map_bytes(size: tuple[int, int]) -> int:
+    """Of one map of so many texels, on the device."""
+    return size[0] * size[1] * BYTES_PER_TEXEL
+
+
+@dataclass(frozen=True)
+class _Source:
+    """One map of a lamp. key: of all that it depends on."""
+
+    scene: LampScene
+    sample_index: int
+    key: str
+
+
 class LampReflections:
-    """The maps of a scene's lamps over the pictures of a frame: drawn once, as far as they fit CACHE_BYTES."""
+    """The maps of a scene's lamps, for every picture of a frame and for later frames: a map is drawn again where its
+    lamp, its resolution or a mesh that the lamp can light has changed. Maps beyond CACHE_BYTES are drawn for each
+    picture."""
 
     def __init__(
         self,
         context: moderngl.Context,
         shaders: ShaderLibrary,
-        geometry: GpuGeometry,
-        lights: Sequence[Light],
+        kept: Kept,
+        snapshot: SceneSnapshot,
         resolution: int,
         area_maps: int,
     ) -> None:
-        """area_maps: points of an AREA lamp that have a map each."""
-        self._geometry = geometry
+        """snapshot: in world space. area_maps: points of an AREA lamp that have a map each."""
+        self._context = context
         self._pass = ReflectiveShadowMapPass(context, shaders, resolution)
-        self._sources = [
-            (light, sample, area_maps)
-            for light in lights
-            if max(light.power) > 0.0
-            for sample in range(len(map_points(light, area_maps)))
-        ]
-        self._kept: dict[int, ReflectiveShadowMap] = {}
-        self._kept_bytes = 0
+        self._area_maps = area_maps
+        self._scenes = LampScenes(snapshot)
+        self._sources: list[_Source] = []
+        for light in snapshot.lights:
+            if max(light.power) > 0.0:
+                scene = self._scenes.of(light)
+                for sample in range(len(map_points(light, area_maps))):
+                    key = content_hash([scene.lamp_key, self._pass.face, sample, area_maps])
+                    self._sources.append(_Source(scene, sample, key))
+        self._maps: KeptMaps = kept.get("reflective_maps", "", KeptMaps)
+        self._maps.keep_only({source.key for source in self._sources})
         self._shared: dict[tuple[int, int], MapTextures] = {}
+        self._part: tuple[str, GpuGeometry, LocalSpace] | None = None
+        self.key = content_hash([source.key for source in self._sources])
 
     def __len__(self) -> int:
         return len(self._sources)
 
     @property
     def drawn(self) -> int:
-        """Maps drawn so far."""
+        """Maps drawn so far in this frame."""
         return self._pass.drawn
 
     def draw(self) -> None:
-        """Draws the maps that are kept."""
-        for index in range(len(self._sources)):
-            if not self._keep(index):
-                return
+        """Draws the maps that are to be kept and are not yet."""
+        for source in self._sources:
+            if self._find(source) is None:
+                break
+        self._maps.drop_spare()
 
     def maps(self) -> Iterator[ReflectiveShadowMap]:
         """Every map of every lamp that shines; each is valid until the next."""
-        for index, (light, sample, count) in enumerate(self._sources):
-            if self._keep(index):
-                yield self._kept[index]
-                continue
-            size = self._pass.size(self._geometry, light)
-            if size not in self._shared:
-                self._shared[size] = self._pass.new_textures(self._geometry, light)
-            yield self._pass.render(self._geometry, light, sample, count, self._shared[size])
+        for source in self._sources:
+            found = self._find(source)
+            if found is None:
+                geometry, light, _ = self._scene_of(source.scene)
+                size = self._pass.size(geometry, light)
+                if size not in self._shared:
+                    self._shared[size] = self._pass.new_textures(geometry, light)
+                found = self._render(source, self._shared[size])
+            yield found
 
-    def _keep(self, index: int) -> bool:
-        """Whether the map is, or now was drawn to be, among those that are kept."""
-        if index in self._kept:
-            return True
-        light, sample, count = self._sources[index]
-        width, height = self._pass.size(self._geometry, light)
-        needed = width * height * BYTES_PER_TEXEL
-        if self._kept_bytes + needed > CACHE_BYTES:
-            return False
-        self._kept[index] = self._pass.render(self._geometry, light, sample, count)
-        self._kept_bytes += needed
-        return True
+    def _find(self, source: _Source) -> ReflectiveShadowMap | None:
+        """The map from those that are kept, drawn now if it is not there and fits among them; else None."""
+        found = self._maps.get(source.key)
+        if found is not None:
+            return found
+        geometry, light, _ = self._scene_of(source.scene)
+        size = self._pass.size(geometry, light)
+        if self._maps.nbytes + map_bytes(size) > CACHE_BYTES:
+            return None
+        found = self._render(source, self._maps.spare(size))
+        self._maps.add(source.key, found)
+        return found
+
+    def _render(self, source: _Source, textures: MapTextures | None) -> ReflectiveShadowMap:
+        geometry, light, space = self._scene_of(source.scene)
+        found = self._pass.render(geometry, light, source.sample_index, self._area_maps, textures)
+        return replace(found, space=space)
+
+    def _scene_of(self, scene: LampScene) -> tuple[GpuGeometry, Light, LocalSpace]:
+        """What the lamp can light on the device, and the lamp, in units of the space. The latest is kept for lamps that
+        can light the same."""
+        if self._part is None or self._part[0] != scene.key:
+            self._part = None
+            local, space = self._scenes.local(scene)
+            self._part = scene.key, GpuGeometry(self._context, local, np.zeros(3)), space
+        _, geometry, space = self._part
+        return geometry, space.light(scene.light), space

@@ -14,6 +14,7 @@ from ...core.progress import Progress, step
 from ...core.scene import Float32
 from ...core.settings import setting
 from ..gpu_layout import CONSTANTS, LAMP
+from ..local_space import LocalSpace
 from ..passes.accumulate import read_image
 from ..passes.gbuffer import GBuffer
 from ..passes.phase_two import EVALUATIONS_PER_DISPATCH, IrradianceImage
@@ -94,6 +95,7 @@ class GatherPass:
     def render(
         self,
         gbuffer: GBuffer,
+        space: LocalSpace,
         maps: Iterator[ReflectiveShadowMap],
         count: int,
         taps: Float32,
@@ -103,7 +105,8 @@ class GatherPass:
     ) -> moderngl.Texture:
         """Sum over all `count` maps in W/m², RGBA32F; w: what bounds took off, mean of the channels, likewise.
 
-        taps: of sample_taps. pictures: how many of them, each with other taps, are averaged. radius: share of the map.
+        space: of the G-buffer. taps: of sample_taps. pictures: how many of them, each with other taps, are averaged.
+        radius: share of the map.
         `progress` hears of each dispatch and may cancel. The next call overwrites the texture.
         """
         self._irradiance.clear()
@@ -124,7 +127,8 @@ class GatherPass:
                 is_last = index == count - 1 and end == len(taps)
                 uniforms = {"first_tap": first, "end_tap": end, "is_last": is_last, "brightest": brightest.tolist()}
                 uniforms |= {"tap_share": 1.0 / len(taps), "area_share": 1.0 / (len(taps) * pictures)}
-                uniforms |= {"radius": radius, "side": found.side}
+                scale, offset = space.to(found.space)
+                uniforms |= {"radius": radius, "side": found.side, "map_scale": scale, "map_offset": offset.tolist()}
                 set_uniforms(shader, uniforms)
                 width, height = self._irradiance.size
                 shader.run(-(-width // GROUP_SIDE), -(-height // GROUP_SIDE))
@@ -159,7 +163,7 @@ class RsmGather(Technique):
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         self._maps = LampReflections(
-            scene.context, scene.shaders, scene.geometry, scene.snapshot.lights, settings.resolution, settings.area_maps
+            scene.context, scene.shaders, scene.kept, scene.world, settings.resolution, settings.area_maps
         )
         self._gather = GatherPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
         self._irradiance: moderngl.Texture | None = None
@@ -173,6 +177,7 @@ class RsmGather(Technique):
         with self.scene.timer.measure("gather"):
             self._irradiance = self._gather.render(
                 frame.gbuffer,
+                self.scene.space,
                 self._maps.maps(),
                 len(self._maps),
                 taps,
