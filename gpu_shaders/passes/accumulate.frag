@@ -7,6 +7,9 @@ layout(binding = DIRECT_UNIT) uniform sampler2D direct_radiance;    // W/(m² sr
 #ifdef HAS_INDIRECT
 layout(binding = IRRADIANCE_UNIT) uniform sampler2D irradiance;     // W/m²
 #endif
+#ifdef HAS_SPECULAR
+layout(binding = SPECULAR_UNIT) uniform sampler2D specular_radiance; // W/(m² sr)
+#endif
 
 uniform vec3 camera_position;   // m, from the local origin
 uniform vec3 camera_backward;   // unit
@@ -34,7 +37,11 @@ void main() {
 #endif
     vec3 to_camera = is_orthographic ? camera_backward : normalize(camera_position - surface.position);
     vec3 indirect = diffuse_albedo(surface, to_camera) * received * INVERSE_PI;
-    out_combined = weight * vec4(surface.emission + direct + indirect, 1.0);
+    vec3 specular = vec3(0.0);
+#ifdef HAS_SPECULAR
+    specular = texelFetch(specular_radiance, pixel, 0).rgb;
+#endif
+    out_combined = weight * vec4(surface.emission + direct + indirect + specular, 1.0);
     out_direct = weight * vec4(direct, 1.0);
     out_indirect = weight * vec4(indirect, 1.0);
     out_irradiance = weight * vec4(received, 1.0);

@@ -85,7 +85,8 @@ def render_frame(
         irradiance = technique.indirect(FrameInputs(view, gbuffer, sample, sample_progress))
         with timer.measure("accumulate"):
             weight = 1.0 / settings.samples
-            accumulate.add(gbuffer, direct, irradiance, view, snapshot.world_radiance, weight)
+            specular = technique.specular()
+            accumulate.add(gbuffer, direct, irradiance, view, snapshot.world_radiance, weight, specular)
         step(sample_progress, 1.0, "samples")
 
     with timer.measure("read back"):

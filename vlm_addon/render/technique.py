@@ -95,6 +95,11 @@ class Technique(ABC):
     def indirect(self, frame: FrameInputs) -> moderngl.Texture | None:
         """Irradiance of each pixel in W/m², RGBA32F of the G-buffer's size; None for none at all."""
 
+    def specular(self) -> moderngl.Texture | None:
+        """Radiance in W/(m² sr) that specular layers send to the eye beside direct light, RGBA32F of the G-buffer's
+        size; None for none. Asked for after `indirect`, of the same picture; it is in the finished picture alone."""
+        return None
+
     def counters(self) -> dict[str, float]:
         """What the technique counted so far in this frame."""
         return {}

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 DIRECT_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
 IRRADIANCE_UNIT = DIRECT_UNIT + 1
+SPECULAR_UNIT = DIRECT_UNIT + 5
 OUTPUTS = ("combined", "direct", "indirect", "irradiance")
 
 
@@ -46,12 +47,21 @@ class AccumulatePass:
         view: View,
         world_radiance: tuple[float, float, float],
         weight: float,
+        specular: moderngl.Texture | None = None,
     ) -> None:
-        """Adds one picture. direct: radiance. irradiance: W/m², None for none. weight: one over the sample count."""
-        defines: dict[str, int | bool] = {"DIRECT_UNIT": DIRECT_UNIT, "IRRADIANCE_UNIT": IRRADIANCE_UNIT}
+        """Adds one picture. direct: radiance. irradiance: W/m², None for none. weight: one over the sample count.
+        specular: radiance beside the direct one, likewise; in the combined picture alone."""
+        defines: dict[str, int | bool] = {
+            "DIRECT_UNIT": DIRECT_UNIT,
+            "IRRADIANCE_UNIT": IRRADIANCE_UNIT,
+            "SPECULAR_UNIT": SPECULAR_UNIT,
+        }
         if irradiance is not None:
             defines["HAS_INDIRECT"] = True
             irradiance.use(IRRADIANCE_UNIT)
+        if specular is not None:
+            defines["HAS_SPECULAR"] = True
+            specular.use(SPECULAR_UNIT)
         combine = FullscreenPass(self._context, self._shaders, "passes/accumulate.frag", defines)
         gbuffer.bind()
         self._albedo.bind()
