@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmarks.support import open_sample
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
+from vlm_addon.core.metrics import point_error
 from vlm_addon.core.scene import SceneSnapshot
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.render.device import Device
@@ -186,11 +187,10 @@ def tolerance_table(frames: Frames, size: tuple[int, int], counts: list[int]) ->
 
 
 def point_errors(frame: Frame, exact: Frame) -> np.ndarray:
-    """|x - r| / max(r, a tenth of the mean r) of the irradiance of each pixel that is lit."""
+    """`point_error` of the irradiance of each pixel that is lit."""
     found, truth = (each.images["irradiance"][..., :3].sum(axis=2, dtype=float) for each in (frame, exact))
     lit = truth > 0.0
-    errors: np.ndarray = np.abs(found - truth)[lit] / np.maximum(truth[lit], 0.1 * truth[lit].mean())
-    return errors
+    return point_error(found[lit], truth[lit])
 
 
 def every(light_mesh: VirtualLightMesh, count: int) -> VirtualLightMesh:

@@ -22,7 +22,8 @@ from vlm_addon.core.light_clusters import LightClusters, light_clusters
 from vlm_addon.core.light_cut import cut_irradiance
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.light_tree import LightTree, build_light_tree
-from vlm_addon.core.light_tree_error import PointErrors, full_irradiance, point_errors
+from vlm_addon.core.light_tree_error import PointErrors, full_irradiance
+from vlm_addon.core.metrics import point_error
 from vlm_addon.core.scene import Float64
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.core.surface_points import SurfacePoints, random_surface_points
@@ -116,7 +117,7 @@ def rows(
         for tolerance in tolerances:
             clusters, relight_ms = relit(tree, light_mesh, radiosity, tolerance)
             cut = cut_irradiance(tree, clusters, light_mesh, radiosity, at.positions, at.normals, tags)
-            errors = point_errors(cut.irradiance[:, 0], full[:, channel])
+            errors = point_error(cut.irradiance[:, 0], full[:, channel])
             yield Row(
                 lights=len(light_mesh),
                 radiosity=name,

@@ -17,7 +17,6 @@ from vlm_addon.core.light_tree_error import (
     PointErrors,
     expected_error,
     full_irradiance,
-    point_errors,
     tree_errors,
 )
 from vlm_addon.core.scene import Float64
@@ -73,12 +72,6 @@ def test_tree_errors_are_those_of_the_cuts_together() -> None:
     np.testing.assert_allclose(found.errors, np.abs(expected - full) / np.maximum(full, 0.1 * full.mean()))
     assert found.evaluated == pytest.approx(sum(cut.evaluated.mean() for cut in cuts))
     assert found.visited == pytest.approx(sum(cut.visited.mean() for cut in cuts))
-
-
-def test_errors_of_dim_points_are_compared_with_a_tenth_of_the_mean() -> None:
-    errors = point_errors(np.array([1.1, 0.01, 0.0]), np.array([1.0, 0.0, 2.0]))
-    np.testing.assert_allclose(errors, [0.1, 0.01 / 0.1, 1.0])
-    np.testing.assert_array_equal(point_errors(np.zeros(2), np.zeros(2)), 0.0)
 
 
 def test_within_looks_at_both_percentiles() -> None:

@@ -15,7 +15,8 @@ from vlm_addon.core.light_clusters import light_clusters
 from vlm_addon.core.light_cut import cut_irradiance
 from vlm_addon.core.light_mesh import VirtualLightMesh, join
 from vlm_addon.core.light_tree import LightTree, build_light_tree
-from vlm_addon.core.light_tree_error import DIM_SHARE, full_irradiance
+from vlm_addon.core.light_tree_error import full_irradiance
+from vlm_addon.core.metrics import POINT_ERROR_FLOOR
 from vlm_addon.core.scene import Float64
 
 TURN = 0.9
@@ -44,7 +45,7 @@ def lit_by(lights: VirtualLightMesh, lamp: Float64) -> Float64:
 
 def largest_pop(found: Float64, full: Float64) -> float:
     """Of (frames, points): largest change from frame to frame that the full sum does not make, as a share of it."""
-    reference = np.maximum(full, DIM_SHARE * full.mean(axis=1, keepdims=True))[1:]
+    reference = np.maximum(full, POINT_ERROR_FLOOR * full.mean(axis=1, keepdims=True))[1:]
     return float((np.abs(np.diff(found - full, axis=0)) / reference).max())
 
 

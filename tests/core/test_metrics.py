@@ -34,6 +34,12 @@ def test_a_black_reference_is_not_a_division_by_zero():
 def test_point_error_of_a_dim_point_is_measured_against_a_tenth_of_the_mean():
     reference = np.array([0.0, 2.0])
     assert point_error(np.array([0.1, 2.0]), reference) == pytest.approx([1.0, 0.0])
+    assert point_error(np.array([1.1, 0.01, 0.0]), np.array([1.0, 0.0, 2.0])) == pytest.approx([0.1, 0.1, 1.0])
+
+
+def test_neither_the_dark_nor_nothing_errs():
+    assert point_error(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]
+    assert point_error(np.zeros(0), np.zeros(0)).tolist() == []
 
 
 def test_flip_is_zero_for_equal_and_large_for_opposite_pictures():

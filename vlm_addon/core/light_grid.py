@@ -65,7 +65,7 @@ class LitTree:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return self.tree.nbytes + sum(array.nbytes for array in vars(self.clusters).values())
+        return self.tree.nbytes + self.clusters.nbytes
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,13 @@ from .grid_frame import OUTSIDE
 from .light_cut import cut_irradiance
 from .light_grid import LightGrid, LitTree, usable_radiosity
 from .light_mesh import VirtualLightMesh
+from .metrics import point_error
 from .range_grid import RangeGrid
 from .scene import UNTAGGED, Float64
 from .surface_points import SurfacePoints
 
 Bools = npt.NDArray[np.bool_]
 
-# A point error is a share of the point's irradiance, or of this share of the mean where that is more.
-_LEAST_SHARE_OF_MEAN = 0.1
 _PERCENTILES = {"median": 50.0, "95 %": 95.0, "99.9 %": 99.9}
 _PAIRS_PER_BLOCK = 1 << 20
 
@@ -40,11 +39,8 @@ class GridError:
 
     @property
     def point_errors(self) -> Float64:
-        """(p,) error of the channels' sum, as a share of it or of a tenth of the mean of all points."""
-        full = self.full.sum(axis=1)
-        least = _LEAST_SHARE_OF_MEAN * full.mean() if len(full) else 0.0
-        scale = np.maximum(full, max(least, float(np.finfo(float).tiny)))
-        return np.asarray(np.abs(self.found.sum(axis=1) - full) / scale)
+        """(p,) `point_error` of the channels' sum."""
+        return point_error(self.found.sum(axis=1), self.full.sum(axis=1))
 
     def percentiles(self) -> dict[str, float]:
         """Percentiles of the point errors by name; 0 without points."""

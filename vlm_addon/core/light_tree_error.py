@@ -15,12 +15,11 @@ from .light_cut import cut_irradiance, light_cut
 from .light_mesh import VirtualLightMesh
 from .light_tree import LightTree
 from .light_tree_bounds import facing_height
+from .metrics import point_error
 from .scene import UNTAGGED, Float64, Int32
 
 Structure = tuple[LightTree, LightClusters]
 
-DIM_SHARE = 0.1
-"""Of the mean irradiance: what errors are compared with where the irradiance itself is less."""
 _PAIRS_PER_BLOCK = 1 << 20
 _POINTS_PER_BLOCK = 256
 _ROUNDING = 1e-9
@@ -29,7 +28,7 @@ _FAR_RADII = 4.0
 
 @dataclass(frozen=True)
 class PointErrors:
-    """errors: (p,) at each point, |found - full| / max(full, DIM_SHARE x mean full), of the sum of the channels.
+    """errors: (p,) `point_error` of the sum of the channels.
 
     evaluated, visited: means over the points, as in CutIrradiance.
     """
@@ -67,13 +66,7 @@ def tree_errors(
         found += cut.irradiance.sum(axis=1)
         evaluated += float(cut.evaluated.mean()) if len(points) else 0.0
         visited += float(cut.visited.mean()) if len(points) else 0.0
-    return PointErrors(point_errors(found, full), evaluated, visited)
-
-
-def point_errors(found: Float64, full: Float64) -> Float64:
-    """(p,) |found - full| / max(full, DIM_SHARE x mean full); 0 where there is no light at all."""
-    reference = np.maximum(full, DIM_SHARE * full.mean()) if len(full) else full
-    return np.abs(found - full) / np.maximum(reference, np.finfo(float).tiny)
+    return PointErrors(point_error(found, full), evaluated, visited)
 
 
 def full_irradiance(

@@ -35,9 +35,10 @@ def mean_relative_error(image: Image, reference: Image, mask: Mask | None = None
 
 
 def point_error(values: Image, reference: Image) -> npt.NDArray[np.float64]:
-    """|x - r| / max(r, 10 % of mean r) of every value, float64 in the shape of the inputs."""
+    """|x - r| / max(r, 10 % of mean r) of every value, float64 in the shape of the inputs; 0 where both are 0."""
     x, r = values.astype(np.float64), reference.astype(np.float64)
-    return np.abs(x - r) / np.maximum(r, POINT_ERROR_FLOOR * r.mean())
+    floor = POINT_ERROR_FLOOR * r.mean() if r.size else 0.0
+    return np.asarray(np.abs(x - r) / np.maximum(r, max(floor, float(np.finfo(float).tiny))))
 
 
 def flip(image: Image, reference: Image) -> tuple[float, npt.NDArray[np.float32]]:
