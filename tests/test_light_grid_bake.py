@@ -12,6 +12,7 @@ import pytest
 from tests.render.rooms import box_room, lights_from_triangles, split
 from vlm_addon.core.light_grid import FEW_LIGHTS, RANGE, GridSettings
 from vlm_addon.core.light_mesh import VirtualLightMesh
+from vlm_addon.core.surface_points import random_surface_points
 from vlm_addon.light_grid_bake import NOTICEABLE_LOSS, GridBake, bake_light_grid, check_lights
 
 ROOM = box_room()
@@ -97,6 +98,19 @@ def test_overflow_and_range_are_told_apart() -> None:
     assert f"{bake.error.share_out_of_range:.1%}" in by_range.problem
     assert f"{bake.error.share_overflowed:.1%}" in by_overflow.problem
     assert bake.grid.overflow in by_overflow.problem
+
+
+def test_the_report_tells_what_the_grid_expects_of_its_error(many: GridBake) -> None:
+    """As a share, as the error itself is told; the estimate is judged in tests/core/test_light_tree_error.py."""
+    assert many.expected is not None
+    full = many.error.full.sum(axis=1)
+    shares = many.expected / np.maximum(full, 0.1 * full.mean())
+    told = many.report()["expected_point_error"]
+    assert told["median"] == pytest.approx(np.median(shares), rel=1e-9)
+    assert told["95 %"] == pytest.approx(np.percentile(shares, 95.0), rel=1e-9)
+    points = random_surface_points(ROOM.meshes, len(full), seed=1).positions
+    np.testing.assert_array_equal(many.expected, many.grid.expected_error(points))
+    assert "expected_point_error" not in bake_light_grid(ROOM, walls(1), GridSettings(mode=RANGE, grid=3)).report()
 
 
 def test_the_report_is_json(many: GridBake) -> None:

@@ -15,7 +15,7 @@ from .core.light_mesh import VirtualLightMesh, empty_light_mesh
 from .core.light_scale import PROBES
 from .core.progress import Progress, silent
 from .core.range_grid import RangeGrid
-from .core.scene import Finding, SceneSnapshot
+from .core.scene import Finding, Float64, SceneSnapshot
 from .core.surface_points import random_surface_points
 from .core.validate import check_light_mesh
 
@@ -29,11 +29,15 @@ NOTICEABLE_LOSS = GridSettings.tolerance
 
 @dataclass(frozen=True)
 class GridBake:
-    """A light grid. seconds: it took to build. error: at random points of the visible surface under even light."""
+    """A light grid. seconds: it took to build. error: at random points of the visible surface under even light.
+
+    expected: (p,) W/m², what the grid itself expects its error to be at those points; None in range mode.
+    """
 
     grid: LightGrid
     seconds: float
     error: GridError
+    expected: Float64 | None
 
     def report(self) -> dict[str, Any]:
         """The bake as JSON-able values."""
@@ -45,8 +49,15 @@ class GridBake:
             "points": len(self.error.point_errors),
             "point_error": self.error.percentiles(),
             "all_lights_summed": self.all_lights_summed,
+            **self._expected(),
             **self._dropped(),
         }
+
+    def _expected(self) -> dict[str, Any]:
+        """Beside `point_error`, so that one sees whether the estimate can be trusted here."""
+        if self.expected is None:
+            return {}
+        return {"expected_point_error": self.error.expected_percentiles(self.expected)}
 
     @property
     def all_lights_summed(self) -> bool:
@@ -124,7 +135,8 @@ def bake_light_grid(
     count = int(np.clip(_PAIRS // max(len(light_mesh), 1), _FEWEST_POINTS, _MOST_POINTS))
     points = random_surface_points(snapshot.meshes, count, seed=1)
     error = grid_error(grid, light_mesh, nominal_radiosity(light_mesh), points)
-    return GridBake(grid, seconds, error)
+    expected = grid.expected_error(points.positions) if settings.mode == TOLERANCE else None
+    return GridBake(grid, seconds, error, expected)
 
 
 def check_lights(

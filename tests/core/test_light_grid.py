@@ -14,6 +14,7 @@ from vlm_addon.core.array_codec import content_hash
 from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid, LitTree, nominal_radiosity
 from vlm_addon.core.light_mesh import empty_light_mesh
+from vlm_addon.core.light_tree_error import expected_error
 from vlm_addon.core.range_grid import RangeGrid, RangeSettings
 from vlm_addon.core.settings import from_mapping
 
@@ -183,6 +184,17 @@ def test_overflow_is_told():
     assert grid.overflow.startswith(f"{cells:,} cells have more than 5 lights; {dropped:,} lights are left out of some")
     entries = sum(part.occupancy.dropped_entries for _, part in grid.structures)
     assert f"{entries:,} or" in grid.overflow
+
+
+def test_the_expected_error_is_that_of_both_trees_as_if_independent():
+    grid = LightGrid.bake(lights(), BOX, WITHIN)
+    parts = [expected_error(part.tree, part.clusters, POINTS) for _, part in grid.structures]
+    assert all(part.any() for part in parts)
+    np.testing.assert_allclose(grid.expected_error(POINTS), np.hypot(*parts))
+    with pytest.raises(InvalidInput, match="light grid points"):
+        grid.expected_error([[0.0, np.nan, 0.0]])
+    with pytest.raises(InvalidInput, match="measure its error"):
+        LightGrid.bake(lights(), BOX, BY_RANGE).expected_error(POINTS)
 
 
 def test_tags_make_a_tree_but_no_grid_stale():

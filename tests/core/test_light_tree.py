@@ -155,8 +155,7 @@ def test_chosen_lights_and_the_others_are_the_whole(lights: VirtualLightMesh) ->
     found = np.zeros((40, 3))
     for part in (chosen, ~chosen):
         tree = build_light_tree(lights, part)
-        assert sum(count for _, count, _ in tree.occupancy) == part.sum()
-        assert (tree.light_parent[~part] == ROOT).all()
+        np.testing.assert_array_equal(tree.light_parent != ROOT, part)
         clusters = light_clusters(tree, lights, radiosity, 0.02)
         found += cut_irradiance(tree, clusters, lights, radiosity, points, normals, np.zeros(40, np.int32)).irradiance
     full = polygon_form_factor(points, normals, lights.corners) @ radiosity
@@ -170,7 +169,6 @@ def test_children_are_listed_in_order(lights: VirtualLightMesh, tree: LightTree)
         np.testing.assert_array_equal(children, np.flatnonzero(tree.parent == cluster))
         np.testing.assert_array_equal(np.sort(members), np.flatnonzero(tree.light_parent == cluster))
     assert len(tree.light_order) == len(lights)
-    assert sum(clusters for _, _, clusters in tree.occupancy) == len(tree)
 
 
 def test_memory_is_a_part_of_what_is_allowed(lights: VirtualLightMesh, tree: LightTree) -> None:

@@ -23,6 +23,7 @@ from .light_cut import light_cut
 from .light_mesh import VirtualLightMesh, require_valid
 from .light_scale import mean_irradiance
 from .light_tree import LightTree, build_light_tree
+from .light_tree_error import expected_error
 from .progress import Progress, silent, step
 from .range_grid import RangeGrid, RangeSettings
 from .scene import Float64
@@ -216,6 +217,22 @@ class LightGrid:
             clusters.append(_Pairs(cut.cluster_points, cut.clusters + first_cluster, cut.cluster_weights))
             first_cluster += len(structure.tree)
         return Candidates(*_by_point(lights, len(array)), *_by_point(clusters, len(array)))
+
+    def expected_error(self, points: npt.ArrayLike) -> Float64:
+        """(p,) W/m², sum over the channels: about how far the irradiance at (p, 3) points may be off, for display.
+
+        See `light_tree_error.expected_error`. Raises InvalidInput for points as `candidates`, and in range mode: what a
+        cell's list leaves out is not known from what it holds.
+        """
+        array = finite_points(points)
+        if self.settings.mode == RANGE:
+            remedy = "measure its error with light_grid_error.grid_error"
+            raise InvalidInput("light grid", "one with a range cannot estimate what it leaves out", remedy)
+        squared = np.zeros(len(array))
+        for _, structure in self.structures:
+            if isinstance(structure, LitTree):
+                squared += expected_error(structure.tree, structure.clusters, array) ** 2
+        return np.sqrt(squared)
 
     def require_made_of(self, light_mesh: VirtualLightMesh) -> None:
         """Raises InvalidInput unless the grid was baked from these very lights."""

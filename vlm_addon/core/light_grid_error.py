@@ -44,8 +44,12 @@ class GridError:
 
     def percentiles(self) -> dict[str, float]:
         """Percentiles of the point errors by name; 0 without points."""
-        errors = self.point_errors
-        return {name: float(np.percentile(errors, at)) if len(errors) else 0.0 for name, at in _PERCENTILES.items()}
+        return _percentiles(self.point_errors)
+
+    def expected_percentiles(self, expected: Float64) -> dict[str, float]:
+        """Those of the point errors that an estimate for the same points says, (p,) W/m², sum over the channels."""
+        full = self.full.sum(axis=1)
+        return _percentiles(point_error(full + expected, full))
 
     @property
     def share_lost(self) -> float:
@@ -65,6 +69,10 @@ class GridError:
     def _share(self, part: Float64) -> float:
         total = float(self.full.sum())
         return float(part.sum()) / total if total > 0.0 else 0.0
+
+
+def _percentiles(errors: Float64) -> dict[str, float]:
+    return {name: float(np.percentile(errors, at)) if len(errors) else 0.0 for name, at in _PERCENTILES.items()}
 
 
 def grid_error(

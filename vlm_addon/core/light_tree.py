@@ -90,13 +90,6 @@ class LightTree:
         """Clusters without a parent."""
         return np.flatnonzero(self.parent == ROOT)
 
-    @property
-    def occupancy(self) -> list[tuple[int, int, int]]:
-        """(level, lights directly in clusters of that level, clusters), finest first."""
-        lights = np.bincount(self.level, np.diff(self.light_offsets))
-        clusters = np.bincount(self.level)
-        return [(int(level), int(lights[level]), int(clusters[level])) for level in np.flatnonzero(clusters)]
-
     def depths(self) -> list[slice]:
         """The clusters of each depth, deepest first."""
         edges = np.flatnonzero(np.diff(self.depth, prepend=-1, append=-1))
