@@ -10,8 +10,9 @@ from vlm_addon.core.scene import Float64, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.local_space import LocalSpace
 from vlm_addon.render.passes.gbuffer import GBuffer
+from vlm_addon.render.passes.low_resolution import PickedPixels
 from vlm_addon.render.passes.rsm import LampReflections
-from vlm_addon.render.techniques.rsm_gather import UNBIASED, GatherPass, sample_taps
+from vlm_addon.render.passes.rsm_gather import UNBIASED, RsmGatherPass, Sampling, sample_taps
 
 WORLD_SPACE = LocalSpace(np.zeros(3), 1.0)
 COLUMNS = 64
@@ -45,8 +46,9 @@ def gathered(
     """(p, 4): irradiance, and what bounds took off, of one picture."""
     with device.current() as context:
         maps = LampReflections(context, device.shaders, device.kept, room, 128, 4)
-        gather = GatherPass(context, device.shaders, COLUMNS, len(points) // COLUMNS)
+        gather = RsmGatherPass(context, device.shaders, COLUMNS, len(points) // COLUMNS)
         gbuffer = picture_of(device, points, normals)
-        taps = sample_taps(samples, 0, weight)
-        found = gather.render(gbuffer, WORLD_SPACE, maps.maps(), len(maps), taps, pictures, radius, silent)
+        picked = PickedPixels(gbuffer, context.texture(gbuffer.size, 2, dtype="i4"))
+        sampling = Sampling(sample_taps(samples, 0, weight), pictures, radius)
+        found = gather.render(picked, WORLD_SPACE, maps.maps(), len(maps), sampling, silent)
         return np.frombuffer(found.read(), np.float32).reshape(-1, 4).astype(float)

@@ -22,7 +22,7 @@ from vlm_addon.core.lamps import lamp_irradiance
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.techniques.rsm_gather import SQUARED, UNBIASED, sample_taps
+from vlm_addon.render.passes.rsm_gather import SQUARED, UNBIASED, sample_taps
 
 WATTS = (45.0, 45.0, 45.0)
 """Of the lamp in the sample scene empty_room, a point in its middle."""

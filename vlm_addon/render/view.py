@@ -31,6 +31,12 @@ class View:
     clip_distances: tuple[float, float]
     rays: Float64
 
+    def picture_width(self, width: int) -> tuple[float, float]:
+        """How much a picture of `width` pixels shows across, m: at depth 0, and more of it for each m of depth."""
+        if self.is_orthographic:
+            return 2.0 / float(np.linalg.norm(self.clip_from_local[0, :3])), 0.0
+        return 0.0, width * float(np.linalg.norm(self.rays[1]))
+
 
 def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: tuple[float, float] = CENTRED) -> View:
     """The view of `camera`, its pixels sampled at their centres plus `jitter` (pixels right and up, -0.5 to 0.5).

@@ -3,37 +3,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.halton import halton_points
-from ...core.progress import Progress, step
+from ...core.array_codec import content_hash
 from ...core.scene import Float32
 from ...core.settings import setting
-from ..gpu_layout import CONSTANTS, LAMP
-from ..local_space import LocalSpace
 from ..passes.accumulate import read_image
-from ..passes.gbuffer import GBuffer
-from ..passes.phase_two import EVALUATIONS_PER_DISPATCH, IrradianceImage
+from ..passes.low_resolution import LowResolutionGather, LowResolutionSettings, PickedPixels, SizedPasses
 from ..passes.rsm import LampReflections, ReflectiveShadowMap
-from ..shader_library import ShaderLibrary, set_uniforms
+from ..passes.rsm_gather import SQUARED, UNBIASED, Marks, Part, RsmGatherPass, Sampling, sample_taps
+from ..passes.temporal import TemporalPass
 from ..technique import FrameInputs, SceneInputs, Technique
 
 if TYPE_CHECKING:
     import moderngl
 
-GROUP_SIDE = 8
-TAP_BINDING = 0
-RSM_UNIT = 10
-UNBIASED, SQUARED = "unbiased", "squared"
-LEAST_TAPS_PER_DISPATCH = 16
+STATIC, ROTATING = "static", "rotating"
+WHOLE, PART = "whole", "part"
+MOVING_AGE = 4.0
+"""Pictures that a history counts for at most where something has moved in a lamp's view, with restart `part`."""
+MOST_IMAGES = 10
+"""Maps that are shown: the lamps of seed 003 (8)."""
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(LowResolutionSettings):
     """How the maps are drawn and sampled."""
 
     samples: int = setting(
@@ -62,97 +60,57 @@ class Settings:
     area_maps: int = setting(
         4, "count", 1, 64, "Points of an area lamp that have a map each; one in its middle is off near the lamp"
     )
-
-
-def sample_taps(count: int, picture: int, weight: str) -> Float32:
-    """(count, 4) float32: places x, y in the unit disc, weight of a sample, and the unbiased weight.
-
-    Places are e1 (sin 2 pi e2, cos 2 pi e2) of uniform e1, e2 (seed 003, 4.3.3), so that they are densest in the
-    middle: one over 2 pi e1 of them to a unit of area. 2 e1 makes up for that, e1² does not. picture: each of a frame
-    takes the next run of Halton's points.
-    """
-    distance, turn = halton_points(count, first=1 + picture * count).T
-    unbiased = 2.0 * distance
-    weights = unbiased if weight == UNBIASED else distance**2
-    angle = 2.0 * np.pi * turn
-    return np.stack([distance * np.sin(angle), distance * np.cos(angle), weights, unbiased], axis=1).astype(np.float32)
-
-
-class GatherPass:
-    """Irradiance of every pixel from reflective shadow maps."""
-
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
-        self._context = context
-        self._irradiance = IrradianceImage(context, width, height)
-        units = {f"RSM_{name}_UNIT": RSM_UNIT + i for i, name in enumerate(("POSITION", "NORMAL", "FLUX"))}
-        defines = {"GROUP_SIDE": GROUP_SIDE, "TAP_BINDING": TAP_BINDING, **units}
-        self._shaders = {
-            is_cube: shaders.compute("techniques/rsm_gather.comp", {**defines, "IS_CUBE": is_cube})
-            for is_cube in (False, True)
-        }
-        self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
-
-    def render(
-        self,
-        gbuffer: GBuffer,
-        space: LocalSpace,
-        maps: Iterator[ReflectiveShadowMap],
-        count: int,
-        taps: Float32,
-        pictures: int,
-        radius: float,
-        progress: Progress,
-    ) -> moderngl.Texture:
-        """Sum over all `count` maps in W/m², RGBA32F; w: what bounds took off, mean of the channels, likewise.
-
-        space: of the G-buffer. taps: of sample_taps. pictures: how many of them, each with other taps, are averaged.
-        radius: share of the map.
-        `progress` hears of each dispatch and may cancel. The next call overwrites the texture.
-        """
-        self._irradiance.clear()
-        tap_buffer = self._context.buffer(taps.tobytes())
-        brightest = np.zeros(3)
-        for index, found in enumerate(maps):
-            brightest += found.brightest
-            self._lamp.orphan()
-            self._lamp.write(found.record.tobytes())
-            # Drawing a map binds textures and buffers of its own.
-            gbuffer.bind()
-            found.bind(RSM_UNIT)
-            self._irradiance.texture.bind_to_image(0)
-            self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
-            tap_buffer.bind_to_storage_buffer(TAP_BINDING)
-            shader = self._shaders[found.is_cube]
-            for first, end in self._runs(len(taps)):
-                is_last = index == count - 1 and end == len(taps)
-                uniforms = {"first_tap": first, "end_tap": end, "is_last": is_last, "brightest": brightest.tolist()}
-                uniforms |= {"tap_share": 1.0 / len(taps), "area_share": 1.0 / (len(taps) * pictures)}
-                scale, offset = space.to(found.space)
-                uniforms |= {"radius": radius, "side": found.side, "map_scale": scale, "map_offset": offset.tolist()}
-                set_uniforms(shader, uniforms)
-                width, height = self._irradiance.size
-                shader.run(-(-width // GROUP_SIDE), -(-height // GROUP_SIDE))
-                self._context.memory_barrier()
-                step(progress, (index + end / len(taps)) / count, "gather")
-        return self._irradiance.texture
-
-    def _runs(self, taps: int) -> Iterator[tuple[int, int]]:
-        """First and end of the taps of each dispatch."""
-        width, height = self._irradiance.size
-        at_once = max(EVALUATIONS_PER_DISPATCH // (width * height), LEAST_TAPS_PER_DISPATCH)
-        for first in range(0, taps, at_once):
-            yield first, min(first + at_once, taps)
+    pattern: str = setting(
+        STATIC,
+        "",
+        None,
+        None,
+        "All samples in each picture (static), or another part of them each time and the mean over earlier pictures "
+        "(rotating), which is faster where only the camera moves; a picture then depends on those before it",
+        source="003, 4.3.3 and 9: rotated around",
+        choices=(STATIC, ROTATING),
+    )
+    part_samples: int = setting(
+        10,
+        "count",
+        1,
+        8192,
+        "Places of the pattern that a pixel looks up in each picture",
+        source="003, 4.3.3: a pattern of 10",
+        only_with=("pattern", ROTATING),
+    )
+    history: int = setting(
+        128,
+        "pictures",
+        1,
+        65536,
+        "Earlier pictures that the mean counts at most; few let the pattern show as flicker",
+        only_with=("pattern", ROTATING),
+    )
+    restart: str = setting(
+        WHOLE,
+        "",
+        None,
+        None,
+        "Where there is no history, or the maps have changed: all samples at once (whole), as right as the static "
+        "pattern and as slow; or a part as everywhere (part), which is noisy and trails behind what moves",
+        source="003, 4.3.3: the latter, at the cost of more artifacts",
+        choices=(WHOLE, PART),
+        only_with=("pattern", ROTATING),
+    )
 
 
 class RsmGather(Technique):
     """One diffuse bounce off what the lamps light, sampled in their reflective shadow maps.
 
-    Known bias: indirect light is not occluded, so it passes through walls; light of glowing surfaces and of the world
-    does not bounce; surfaces reflect on their counter-clockwise side only, as virtual lights do; a lamp that casts no
-    shadow still bounces off the nearest surface alone. The published (squared) weight loses two thirds of light that
-    comes evenly from the disc. A radius below 1 leaves out what lies outside of the disc. Where surfaces meet, the
-    bounded geometry term takes off light, the less the more samples (counter bound_removes_share). All pixels use the
-    same places around their own in the map, so what few samples miss shows as bands, not as noise.
+    Known bias: indirect light is not occluded, so it passes through walls; light of glowing surfaces does not bounce;
+    surfaces reflect on their counter-clockwise side only, as virtual lights do; a lamp that casts no shadow still
+    bounces off the nearest surface alone. The published (squared) weight loses two thirds of light that comes evenly
+    from the disc. A radius below 1 leaves out what lies outside of the disc. Where surfaces meet, the bounded geometry
+    term takes off light, the less the more samples (counter bound_removes_share, image rsm_gather_bound_removes). All
+    pixels use the same places around their own in the map, so what few samples miss shows as bands, not as noise.
+    Interpolation from a low resolution smooths what is smaller than its pixels. The static pattern gives the same
+    picture for the same scene; the rotating one does for the same pictures before it since lamps or settings changed.
     """
 
     name = "rsm_gather"
@@ -162,36 +120,82 @@ class RsmGather(Technique):
 
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
+        width, height = scene.settings.width, scene.settings.height
         self._maps = LampReflections(
             scene.context, scene.shaders, scene.kept, scene.world, settings.resolution, settings.area_maps
         )
-        self._gather = GatherPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        self._low = LowResolutionGather(
+            scene.context, scene.shaders, width, height, settings, keep_low=scene.settings.buffers
+        )
+        self._passes = SizedPasses(lambda w, h: RsmGatherPass(scene.context, scene.shaders, w, h))
+        self._temporal: TemporalPass | None = None
+        if settings.pattern == ROTATING:
+            self._temporal = TemporalPass(scene.context, scene.shaders, scene.kept, self.name, width, height)
+        self._lights_key = content_hash([[replace(light, name="") for light in scene.world.lights], settings])
         self._irradiance: moderngl.Texture | None = None
+        self._marks: Marks | None = None
         with scene.timer.measure("reflective shadow maps"):
             self._maps.draw()
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the maps' samples of flux times the bounded geometry term."""
-        chosen = self.chosen
-        taps = sample_taps(chosen.samples, frame.sample_index, chosen.weight)
+        if self.scene.settings.buffers:
+            self._marks = self._new_marks()
         with self.scene.timer.measure("gather"):
-            self._irradiance = self._gather.render(
-                frame.gbuffer,
+            if self._temporal is None:
+                taps = sample_taps(self.chosen.samples, frame.sample_index, self.chosen.weight)
+                sampling = Sampling(taps, self.scene.settings.samples, self.chosen.radius)
+                self._irradiance = self._gathered(frame, sampling)
+            else:
+                self._irradiance = self._averaged(frame, self._temporal)
+        return self._irradiance
+
+    def _averaged(self, frame: FrameInputs, temporal: TemporalPass) -> moderngl.Texture:
+        """The mean with earlier pictures."""
+        chosen = self.chosen
+        keys = self._lights_key, self._maps.key
+        limit = MOVING_AGE if chosen.restart == PART else 0.0
+        age = temporal.begin(frame.gbuffer, frame.view, self.scene.space, *keys, limit)
+        taps = sample_taps(chosen.samples, 0, chosen.weight)
+        parts = -(-chosen.samples // chosen.part_samples)
+        first = temporal.step % parts * chosen.part_samples
+        part = Part(first, min(first + chosen.part_samples, chosen.samples), age, self._reach())
+        first_age = parts
+        if chosen.restart == PART:
+            taps, first_age = taps[part.first : part.end], 1
+            part = replace(part, first=0, end=len(taps))
+        found = self._gathered(frame, Sampling(taps, parts // first_age, chosen.radius, part))
+        return temporal.finish(frame.gbuffer, found, first_age, max(chosen.history, first_age), self._brightest())
+
+    def _gathered(self, frame: FrameInputs, sampling: Sampling) -> moderngl.Texture:
+        def gather(picked: PickedPixels) -> moderngl.Texture:
+            return self._passes.of(picked.gbuffer).render(
+                picked,
                 self.scene.space,
                 self._maps.maps(),
                 len(self._maps),
-                taps,
-                self.scene.settings.samples,
-                chosen.radius,
+                sampling,
                 frame.progress,
+                self._marks,
             )
-        return self._irradiance
+
+        return self._low.render(frame.gbuffer, frame.view, gather)
+
+    def _reach(self) -> int:
+        """How far aside a pixel may lie that takes over what is found for one."""
+        factor: int = self.chosen.low_resolution
+        return factor - 1 + factor // 2
+
+    def _brightest(self) -> tuple[float, float, float]:
+        """W/m²: what no irradiance exceeds."""
+        red, green, blue = np.sum([found.brightest for found in self._maps.maps()] + [np.zeros(3)], axis=0).tolist()
+        return red, green, blue
 
     def counters(self) -> dict[str, float]:
         """Maps and how many were drawn in this frame; share of the unbounded irradiance that bounds took off in the
-        last picture."""
+        last picture; share of the pixels that were interpolated."""
         counted = {"reflective_maps": len(self._maps), "reflective_maps_drawn": self._maps.drawn}
-        return {**counted, "bound_removes_share": self._removed_share()}
+        return {**counted, **self._low.counters(), "bound_removes_share": self._removed_share()}
 
     def _removed_share(self) -> float:
         if self._irradiance is None:
@@ -200,9 +204,43 @@ class RsmGather(Technique):
         kept, removed = float(image[..., :3].mean(axis=2).sum()), float(image[..., 3].sum())
         return removed / (kept + removed) if removed > 0.0 else 0.0
 
+    def images(self) -> dict[str, Float32]:
+        """Of the last picture: what bounds took off in W/m², low resolution and history; and of the first maps, in
+        their own sizes, position in m, normal, flux in W, and where the pixel amid the picture looked."""
+        found = dict(self._low.images())
+        if self._temporal is not None:
+            found |= self._temporal.images()
+        if self._irradiance is not None:
+            found["bound_removes"] = np.ascontiguousarray(read_image(self._irradiance)[..., 3:])
+        for index, reflective_map in enumerate(islice(self._maps.maps(), MOST_IMAGES)):
+            found |= {f"map_{index}_{part}": image for part, image in map_images(reflective_map).items()}
+        if self._marks is not None:
+            found |= {f"map_{index}_places": read_image(image) for index, image in self._marks.images.items()}
+        return {f"{self.name}_{part}": image for part, image in found.items()}
+
+    def _new_marks(self) -> Marks:
+        """Of the pixel amid the picture that is looked up at low resolution, too."""
+        factor = self.chosen.low_resolution
+        width, height = self.scene.settings.width, self.scene.settings.height
+        images = {}
+        for index, found in enumerate(islice(self._maps.maps(), MOST_IMAGES)):
+            images[index] = self.scene.context.texture(
+                found.flux.size, 1, bytes(4 * found.flux.width * found.flux.height), dtype="f4"
+            )
+        return Marks((width // 2 // factor * factor, height // 2 // factor * factor), images)
+
     def reasons(self) -> list[str]:
         """Which lamps' light does not bounce as they shine."""
         names = [light.name for light in self.scene.snapshot.lights if not light.casts_shadow]
         if not names:
             return []
         return [f"light of {', '.join(names)} bounces off the nearest surfaces only, though it casts no shadow"]
+
+
+def map_images(found: ReflectiveShadowMap) -> dict[str, Float32]:
+    """Position in world space in m, normal, and flux in W of a map; 0 where it shows nothing; row 0 at the top."""
+    position, normal, flux = (read_image(texture) for texture in (found.position, found.normal, found.flux))
+    shown = normal[..., 3:] > 0.0
+    world = np.where(shown, found.space.world_points(position[..., :3]), 0.0)
+    images = {"position": world, "normal": normal[..., :3], "flux": flux[..., :3] * found.space.unit**2}
+    return {part: np.ascontiguousarray(image, np.float32) for part, image in images.items()}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Adds to every pixel what it receives from a run of samples of one reflective shadow map (seed 003, 4.3.3): surface
-// that the lamp lights, looked up in a disc around the place where the pixel projects into the map.
+// that the lamp lights, looked up in a disc around the place where the pixel projects into the map. With a history, a
+// pixel that has one takes only a part of the samples.
 #include "passes/gbuffer_samplers.glsl"
 #include "lib/rsm.glsl"
 #include "lib/vpl.glsl"
@@ -15,22 +16,54 @@ layout(binding = RSM_NORMAL_UNIT) uniform sampler2D rsm_normal;
 layout(binding = RSM_FLUX_UNIT) uniform sampler2D rsm_flux;
 
 layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²; w: what bounds took off, mean of the channels
+layout(binding = PICKED_PIXEL_UNIT) uniform isampler2D picked_pixel;
+#if HAS_HISTORY
+layout(binding = AGE_UNIT) uniform sampler2D history_age;   // 0 where there is none
+uniform uvec2 part;         // first and end of the taps of pixels with a history
+uniform int reach;          // pixels to each side that have to have one, too
+#endif
+#if MARKS_PLACES
+layout(r32f, binding = 1) writeonly uniform image2D places; // 1 where the marked pixel looked
+uniform ivec2 marked;
+#endif
 
-uniform uint first_tap, end_tap;
-uniform float tap_share;    // one over the number of taps
-uniform float area_share;   // one over that of all pictures: in their mean a tap stands for so much of the surface
+uniform uint first_tap, end_tap; // of this run
+uniform uint tap_count;
+uniform float area_share;   // one over the taps of all pictures: in their mean a tap stands for so much of the surface
 uniform float map_scale;    // with the offset takes a pixel's place into the space of the map
 uniform vec3 map_offset;
 uniform float radius;       // of the disc; 1 reaches all of the map from everywhere
 uniform int side;           // texels along a face
-uniform bool is_last;       // run of the picture
+uniform bool is_cut;        // at the brightest, after this run
 uniform vec3 brightest;     // W/m², what no surface's radiosity exceeds
+
+// First and end of the taps of a pixel.
+uvec2 own_taps(ivec2 pixel) {
+#if HAS_HISTORY
+    // What is found here may be spread over the pixels around, and none of them may go without.
+    bool has_history = true;
+    ivec2 last = textureSize(history_age, 0) - 1;
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
+            has_history = has_history && texelFetch(history_age, clamp(pixel + ivec2(x, y), ivec2(0), last), 0).x > 0.0;
+        }
+    }
+    if (has_history) {
+        return part;
+    }
+#endif
+    return uvec2(0u, tap_count);
+}
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(irradiance))) || !pixel_shows_geometry(pixel)) {
         return;
     }
+    ivec2 picture_pixel = texelFetch(picked_pixel, pixel, 0).xy;
+    uvec2 own = own_taps(picture_pixel);
+    uint first = max(own.x, first_tap), end = min(own.y, end_tap);
+    float tap_share = 1.0 / float(own.y - own.x);
     Lamp lamp = lamps[0];
     vec3 p = map_scale * texelFetch(gbuffer_position, pixel, 0).xyz + map_offset;
     vec3 n = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
@@ -48,7 +81,7 @@ void main() {
 #endif
     vec3 sum = vec3(0.0);
     float removed = 0.0;
-    for (uint i = first_tap; i < end_tap; ++i) {
+    for (uint i = first; i < end; ++i) {
         vec4 tap = taps[i];
 #if IS_CUBE
         ivec2 texel = cube_texel(sphere_direction(frame, disc_radius * tap.xy), side);
@@ -58,6 +91,11 @@ void main() {
             continue;
         }
         ivec2 texel = ivec2(place * float(side));
+#endif
+#if MARKS_PLACES
+        if (picture_pixel == marked) {
+            imageStore(places, texel, vec4(1.0));
+        }
 #endif
         vec4 flux = texelFetch(rsm_flux, texel, 0);
         if (max(max(flux.r, flux.g), flux.b) <= 0.0) {
@@ -73,7 +111,7 @@ void main() {
         removed += geometry.y * dot(power, vec3(1.0 / 3.0));
     }
     vec4 total = imageLoad(irradiance, pixel) + vec4(sum, removed);
-    if (is_last) {
+    if (is_cut) {
         vec3 over = max(total.rgb - brightest, 0.0);
         total += vec4(-over, dot(over, vec3(1.0 / 3.0)));
     }
