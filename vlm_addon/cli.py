@@ -82,7 +82,10 @@ def _add_bake(commands: argparse._SubParsersAction[_Parser]) -> None:
     range_help = "a light grid that drops lights farther away than so many of their radii, instead of a tolerance"
     mode.add_argument("--range", type=float, metavar="R", help=range_help)
     command.add_argument("--max-lights", type=int, metavar="K", help="most lights in a cell, with --range")
-    command.add_argument("--light-grid", type=Path, metavar="OUT.vlmgrid", help="the light grid as a file")
+    grid_help = (
+        "the light grid as a file; with --range, OUT.npz holds the thesis's lists of one size for other programs"
+    )
+    command.add_argument("--light-grid", type=Path, metavar="OUT.vlmgrid", help=grid_help)
     command.add_argument("--save", type=Path, metavar="OUT.blend", help="the scene with its light mesh and settings")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="what was made, measured and found")
     command.set_defaults(run=_bake)

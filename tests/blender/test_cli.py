@@ -142,6 +142,17 @@ def test_bake_keeps_the_light_grid_it_was_asked_for_in_the_scene_and_in_a_file(l
     assert loaded.nbytes == written["bytes"]
 
 
+def test_bake_writes_the_lists_of_one_size_that_other_programs_read(lit_room, tmp_path, capsys):
+    lists = tmp_path / "room.npz"
+    options = ["--range", 8, "--grid", 10, "--max-lights", 5]
+    assert run(capsys, "bake", lit_room, "--triangles", 12, *options, "--light-grid", lists)[0] == 0
+    with np.load(lists) as read:
+        assert read["static_lists"].shape == (1000, 5)
+    code, errors = run(capsys, "bake", lit_room, "--triangles", 12, "--tolerance", 0.1, "--light-grid", lists)
+    assert code == 2
+    assert "no cells" in errors[0]
+
+
 def test_bake_says_how_far_off_the_light_grid_is(lit_room, tmp_path, capsys):
     report = tmp_path / "report.json"
     assert run(capsys, "bake", lit_room, "--triangles", 12, "--tolerance", 0.05, "--json", report)[0] == 0

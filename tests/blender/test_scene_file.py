@@ -6,7 +6,7 @@ import re
 import bpy
 import pytest
 
-from vlm_addon.blender.scene_file import atomic_output, open_scene, require_writable, save_blend
+from vlm_addon.blender.scene_file import open_scene, require_writable, save_blend
 from vlm_addon.core.errors import InvalidInput
 
 
@@ -141,33 +141,6 @@ def test_saving_over_a_file_leaves_no_backup(tmp_path):
     for _ in range(2):
         save_blend(tmp_path / "out.blend")
     assert in_folder(tmp_path) == ["out.blend"]
-
-
-def test_an_output_that_fails_leaves_nothing(tmp_path):
-    target = tmp_path / "out.txt"
-    target.write_text("before")
-
-    def fail():
-        with atomic_output(target) as temporary:
-            temporary.write_text("half")
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        fail()
-    assert in_folder(tmp_path) == ["out.txt"]
-    assert target.read_text() == "before"
-
-
-def test_an_output_appears_by_rename_with_ordinary_rights(tmp_path):
-    target = tmp_path / "out.txt"
-    with atomic_output(target) as temporary:
-        assert temporary.suffix == ".txt"
-        temporary.write_text("whole")
-        assert not target.exists()
-    ordinary = tmp_path / "ordinary"
-    ordinary.write_text("")
-    assert target.stat().st_mode == ordinary.stat().st_mode
-    assert target.read_text() == "whole"
 
 
 @pytest.mark.parametrize(

@@ -267,6 +267,12 @@ def test_fixed_size_lists_hold_the_same_and_a_light_that_emits_nothing():
             assert (row[count:] == grid.light_count).all()
 
 
+def test_fixed_size_lists_that_no_memory_holds_are_refused():
+    grid = RangeGrid.bake(random_lights(9, 10), BOX, RangeSettings(20, 3.0, 1_000_000))
+    with pytest.raises(InvalidInput, match=r"8,000 of 1,000,000 lights take 32\.0 GB; set max_lights"):
+        grid.fixed_size_lists()
+
+
 def test_nbytes_counts_every_array():
     grid = RangeGrid.bake(random_lights(9, 70), BOX, RangeSettings(4, 3.0))
     pairs = len(grid.lists.light_ids)

@@ -14,11 +14,14 @@ import bpy
 
 from ..bake import Bake, bake
 from ..core.errors import InvalidInput
+from ..core.light_grid_export import SUFFIX as FIXED_SIZE_SUFFIX
+from ..core.light_grid_export import save_fixed_size_lists
 from ..core.light_grid_file import save_light_grid
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..core.settings import describe, from_mapping
 from ..core.simplify import SimplifySettings
+from ..core.whole_file import atomic_output
 from ..light_grid_bake import GridBake, bake_light_grid, check_lights
 from ..render.frame_types import Frame, RenderSettings, require_in_range
 from ..render.technique import technique_by_name, technique_list
@@ -32,7 +35,7 @@ from .light_mesh_io import Extraction, extract, extract_light_mesh
 from .names import SOURCES_PROPERTY
 from .properties import ensure_scene_settings, technique_settings
 from .render_process import KEPT
-from .scene_file import OpenedScene, atomic_output, open_scene, require_writable, save_blend
+from .scene_file import OpenedScene, open_scene, require_writable, save_blend
 from .write_back import write_light_mesh
 
 
@@ -65,7 +68,8 @@ def bake_command(arguments: Namespace) -> None:
     grid = _grid(found.snapshot, arguments)
     findings = (*findings, *(grid.findings if grid is not None else ()))
     if grid is not None and arguments.light_grid is not None:
-        save_light_grid(grid.grid, arguments.light_grid)
+        write = save_fixed_size_lists if arguments.light_grid.suffix == FIXED_SIZE_SUFFIX else save_light_grid
+        write(grid.grid, arguments.light_grid)
     if arguments.save is not None:
         save_blend(arguments.save, opened)
     _print_findings(findings)

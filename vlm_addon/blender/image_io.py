@@ -15,8 +15,8 @@ import numpy as np
 from ..core.errors import InvalidInput, VlmError
 from ..core.exr import image_of, read_exr, write_exr
 from ..core.scene import Float32
+from ..core.whole_file import atomic_output
 from .color_space import convert, rec709_to_working
-from .scene_file import atomic_output
 from .temporary import present, restored
 
 EXR, PNG = ".exr", ".png"

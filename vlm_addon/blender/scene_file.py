@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opening .blend files for the command line, and writing files that appear whole or not at all."""
+"""Opening .blend files for the command line, and saving them."""
 
 from __future__ import annotations
 
-import contextlib
 import gzip
-import os
 import re
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +12,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import InvalidInput, VlmError
+from ..core.whole_file import atomic_output
 
 BLEND_MAGIC = b"BLENDER"
 GZIP_MAGIC = b"\x1f\x8b"
@@ -184,36 +180,3 @@ def require_writable(path: Path | str) -> Path:
     with atomic_output(path, keep=False):
         pass
     return path
-
-
-@contextmanager
-def atomic_output(path: Path | str, keep: bool = True) -> Iterator[Path]:
-    """A temporary path beside `path`, with its suffix, that becomes `path` when the block ends well.
-
-    Otherwise, or with keep=False, it is removed. Raises InvalidInput where the folder takes no file.
-    """
-    path = Path(path).absolute()
-    remedy = "give a path that can be written"
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise InvalidInput(str(path), f"it cannot be written ({error.strerror})", remedy) from error
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        if keep:
-            # mkstemp makes private files; what a program writes for its user is as the user's mask says.
-            temporary.chmod(0o666 & ~_umask())
-            os.replace(temporary, path)
-    except OSError as error:
-        raise InvalidInput(str(path), f"it cannot be written ({error.strerror})", remedy) from error
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            temporary.unlink()
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -7,12 +7,10 @@ are written.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
 import struct
-import tempfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -26,6 +24,7 @@ from .light_grid import RANGE, GridSettings, LightGrid, LitTree
 from .light_grid_layout import require_sound
 from .light_mesh import VirtualLightMesh
 from .range_grid import RangeGrid
+from .whole_file import atomic_output
 
 MAGIC = b"VLMGRID\n"
 VERSION = 2
@@ -41,7 +40,6 @@ _PLAIN = (int, float, str)
 
 def save_light_grid(grid: LightGrid, path: Path | str) -> None:
     """Writes `grid` as `path`, which appears whole or not at all. Raises InvalidInput where nothing can be written."""
-    path = Path(path).absolute()
     tree, arrays = flatten(grid)
     described = {"tree": tree, "arrays": [{"dtype": array.dtype.str, "shape": array.shape} for array in arrays]}
     text = json.dumps(described).encode()
@@ -51,23 +49,10 @@ def save_light_grid(grid: LightGrid, path: Path | str) -> None:
         body += [array.tobytes(), bytes(-array.nbytes % _ALIGNMENT)]
     length = sum(len(part) for part in body)
     header = _HEADER.pack(MAGIC, VERSION, length, _digest(VERSION, body))
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    try:
-        with open(handle, "wb") as file:
-            file.writelines([header, *body])
-            file.flush()
-            os.fsync(file.fileno())
-        # mkstemp makes private files; what a program writes for its user is as the user's mask says.
-        Path(name).chmod(0o666 & ~_umask())
-        os.replace(name, path)
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(name)
+    with atomic_output(path) as temporary, open(temporary, "wb") as file:
+        file.writelines([header, *body])
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def load_light_grid(path: Path | str, light_mesh: VirtualLightMesh) -> LightGrid:
@@ -158,13 +143,3 @@ def _digest(version: int, body: list[Any]) -> bytes:
     for part in body:
         digest.update(part)
     return digest.digest()
-
-
-def _cannot_write(path: Path, error: OSError) -> InvalidInput:
-    return InvalidInput(str(path), f"it cannot be written ({error.strerror})", "give a path that can be written")
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -23,6 +23,9 @@ from .progress import Progress, silent
 from .scene import Float64
 from .settings import checked_values, setting
 
+MOST_FIXED_BYTES = 1 << 32
+"""Of lists of one size, which are held in memory at once."""
+
 
 @dataclass(frozen=True)
 class RangeSettings:
@@ -172,6 +175,11 @@ class RangeGrid:
         """(cells, k) uint32, k = max_lights or what the fullest cell holds: the thesis's layout (seed 002, 4.1).
 
         Empty slots name light `light_count`, one past the last: whoever uploads the lights appends one that emits
-        nothing.
+        nothing. Raises InvalidInput for lists of more than MOST_FIXED_BYTES.
         """
-        return self.lists.fixed_size(self.settings.max_lights or self.occupancy.fullest, self.light_count)
+        width = self.settings.max_lights or self.occupancy.fullest
+        size = np.dtype(np.uint32).itemsize * self.occupancy.cells * width
+        if size > MOST_FIXED_BYTES:
+            problem = f"{self.occupancy.cells:,} of {width:,} lights take {1e-9 * size:.1f} GB"
+            raise InvalidInput("lists of one size", problem, "set max_lights, or use a smaller grid")
+        return self.lists.fixed_size(width, self.light_count)
