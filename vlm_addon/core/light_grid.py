@@ -115,6 +115,10 @@ class LightGrid:
     ) -> LightGrid:
         """The grid of a light mesh over `bounds` (lower and upper corner, m). probes: points of what is lit.
 
+        Without probes a tolerance is a share of what a closed room would receive whose walls are the lights: their
+        power over their area. That is too much, and the grid errs by more than the tolerance, where most light meets no
+        surface; `surface_points.random_surface_points` makes probes of a scene's meshes.
+
         In tolerance mode its clusters are lit by `nominal_radiosity` until `relit`. Raises InvalidInput for lights,
         settings or bounds that cannot be used, Cancelled when `progress` says so.
         """
