@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +23,8 @@ from .shadow_map import LampShadows, ShadowMap
 if TYPE_CHECKING:
     import moderngl
 
+FRAGMENT = "passes/direct_light.frag"
+
 
 class DirectLightPass:
     """Diffuse and specular reflection of every lamp, one draw for each, with filtered shadows.
@@ -28,9 +32,22 @@ class DirectLightPass:
     Each call takes some points of every soft lamp; the mean over all sample indices converges to the soft shadow.
     """
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
-        self._radiance = context.texture((width, height), 4, dtype="f4")
-        self._framebuffer = context.framebuffer([self._radiance])
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        width: int,
+        height: int,
+        fragment: str = FRAGMENT,
+        outputs: int = 1,
+        uniforms: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        """fragment: another shader that is run for each lamp likewise, with what `outputs` images it adds to and
+        `uniforms` of its own."""
+        self.images = [context.texture((width, height), 4, dtype="f4") for _ in range(outputs)]
+        self._framebuffer = context.framebuffer(self.images)
+        self._fragment = fragment
+        self._uniforms = uniforms
         self._context = context
         self._shaders = shaders
         self._variants: dict[tuple[int, int, bool], FullscreenPass] = {}
@@ -72,8 +89,8 @@ class DirectLightPass:
                     shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together, part_of_view.window)
                     outer = part_of_view.outer if part_of_view.outer < math.inf else 0.0
                     uniforms = {"weight": 1.0 / together, "distances": (outer, part_of_view.inner)}
-                    self._add(gbuffer, shadow_map, camera | uniforms)
-        return self._radiance
+                    self._add(gbuffer, shadow_map, camera | uniforms | dict(self._uniforms))
+        return self.images[0]
 
     def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, uniforms: dict[str, Any]) -> None:
         # New storage: llvmpipe (Mesa 22) lets a write overtake draws that still read the old one.
@@ -95,5 +112,5 @@ class DirectLightPass:
                 zip(("LAMP_KIND", "SHADOW_KIND", "HAS_RADIUS"), key, strict=True)
             )
             defines["WINDOW_FADE"] = FADE
-            self._variants[key] = FullscreenPass(self._context, self._shaders, "passes/direct_light.frag", defines)
+            self._variants[key] = FullscreenPass(self._context, self._shaders, self._fragment, defines)
         return self._variants[key]

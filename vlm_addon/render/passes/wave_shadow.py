@@ -36,7 +36,7 @@ NEAR = NEAREST * _FARTHEST
 
 @dataclass(frozen=True)
 class WaveMaps:
-    """What some lights of a wave see. positions: (m, 3) float64; frames: (m, 3, 3) of core.light_wave.light_frames, both
+    """What some lights of a wave see. positions: (m, 3) float64; frames: (m, 3, 3) of core.light_wave, both
     in world space. textures: R32F of nearness as in lib/shadow.glsl, one for each."""
 
     positions: Float64
