@@ -27,6 +27,7 @@ from .light_tree_bounds import (
     place_moments,
     symmetric,
 )
+from .morton import spread_bits
 from .scene import Float64, Int32
 
 Int64 = npt.NDArray[np.int64]
@@ -180,20 +181,7 @@ def _grid(centroids: Float64, radii: Float64) -> _Grid:
     # Cells of the level above the lights' own are as large as the lights' radii.
     entry = np.clip(np.ceil(np.log2(np.maximum(radii, 2.0 * cell) / cell)) - 1, 0, levels - 1).astype(np.int64)
     cells = np.minimum(np.floor((centroids - low) / cell), 2**_MAX_LEVELS - 1).astype(np.int64)
-    return _Grid(low, cell, _spread_bits(cells) @ np.array([1, 2, 4]), entry, levels)
-
-
-def _spread_bits(values: Int64) -> Int64:
-    """Two zeros between the bits of integers of up to 21 bits."""
-    for shift, mask in (
-        (32, 0x1F00000000FFFF),
-        (16, 0x1F0000FF0000FF),
-        (8, 0x100F00F00F00F00F),
-        (4, 0x10C30C30C30C30C3),
-        (2, 0x1249249249249249),
-    ):
-        values = (values | values << shift) & mask
-    return values
+    return _Grid(low, cell, spread_bits(cells) @ np.array([1, 2, 4]), entry, levels)
 
 
 def _facing(normals: Float64) -> Int64:

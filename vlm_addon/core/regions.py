@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .mesh_topology import Bool, Int64, Rows, rows_by_key, sum_by, vertex_faces
+from .morton import morton_codes
 from .reduce_surface import ReducedSurface
 from .scene import Float64
 from .source_surface import SourceSurface
-from .triangle_tree import morton_codes
 
 # Lights before and after a dropped shell on the Z-order curve among which its triangles choose.
 ADOPTION_WINDOW = 8

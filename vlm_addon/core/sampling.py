@@ -13,8 +13,8 @@ import numpy as np
 
 from .light_mesh import SourceSamples
 from .mesh_topology import Int64, Rows
+from .morton import morton_codes
 from .scene import Float64
-from .triangle_tree import morton_codes
 
 MINIMUM_SAMPLES = 4
 MAXIMUM_SAMPLES = 256

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .mesh_topology import Int64
+from .morton import morton_codes
 from .scene import Float64
 
 LEAF_SIZE = 4
-BITS_PER_AXIS = 20
 # A segment that starts on a triangle meets it at 0 up to rounding.
 HIT_START = 1e-6
 # A segment through an edge meets at least one of its triangles, also with rounding.
@@ -68,32 +68,6 @@ def _size_classes(corners: Float64) -> Int64:
     ratio = extent / (median if median > 0 else 1.0)
     classes: Int64 = np.floor(0.5 * np.log2(np.maximum(ratio, 1.0))).astype(np.int64)
     return classes
-
-
-def morton_codes(points: Float64) -> Int64:
-    """(n,) int64: position along the Z-order curve through the points' bounding cube; near codes are near in space."""
-    if not len(points):
-        return np.zeros(0, np.int64)
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
-    cells = np.minimum((points - low) / extent * (1 << BITS_PER_AXIS), (1 << BITS_PER_AXIS) - 1).astype(np.int64)
-    code = np.zeros(len(points), np.int64)
-    for axis in range(3):
-        code |= _spread_bits(cells[:, axis]) << (2 - axis)
-    return code
-
-
-def _spread_bits(value: Int64) -> Int64:
-    """Each of the lower 21 bits moved to every third place."""
-    for shift, mask in (
-        (32, 0x1F00000000FFFF),
-        (16, 0x1F0000FF0000FF),
-        (8, 0x100F00F00F00F00F),
-        (4, 0x10C30C30C30C30C3),
-        (2, 0x1249249249249249),
-    ):
-        value = (value | (value << shift)) & mask
-    return value
 
 
 def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> Float64:
