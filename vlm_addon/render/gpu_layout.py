@@ -15,6 +15,7 @@ import numpy as np
 from ..core.brdf import MAX_F0
 from ..core.lamps import NARROW_CONE
 from ..core.light_clusters import FADE, SOFTNESS
+from ..core.stacked_hemispheres import LEAST_COSINE
 
 # GLSL type: (numpy scalar, components, alignment in bytes)
 _STD430: Mapping[str, tuple[str, int, int]] = {
@@ -303,5 +304,6 @@ CONSTANTS: dict[str, int | float] = {
     "NARROW_CONE": NARROW_CONE,
     "CLUSTER_FADE": FADE,
     "CLUSTER_SOFTNESS": SOFTNESS,
+    "LEAST_COSINE": LEAST_COSINE,
 }
 """Numbers that Python and GLSL share; every shader sees them as `#define`s."""

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...core.light_wave import Wave
 from ...core.progress import Progress, step
-from ...core.stacked_hemispheres import LEAST_COSINE
 from ..albedo_texture import AlbedoTexture
 from ..geometry import GpuGeometry
 from ..gpu_layout import CONSTANTS
@@ -37,7 +36,6 @@ WAVE_DEFINES = {
     "POINT_BINDING": POINT_BINDING,
     "LIGHT_BINDING": LIGHT_BINDING,
     "FACE_BINDING": FACE_BINDING,
-    "LEAST_COSINE": LEAST_COSINE,
 }
 
 
