@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 
 from benchmarks.support import open_sample
 from vlm_addon.core.block_lists import build_block_lists
 from vlm_addon.core.grid_frame import make_frame
-from vlm_addon.core.light_grid import RANGE, GridSettings, LightGrid, nominal_radiosity
+from vlm_addon.core.light_grid import RANGE, GridSettings, LightGrid
 from vlm_addon.core.light_grid_error import grid_error
 from vlm_addon.core.range_grid import RangeGrid, RangeSettings, light_shapes
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
@@ -66,8 +67,8 @@ def main() -> None:
             started = time.perf_counter()
             grid = RangeGrid.from_lists(RangeSettings(options.grid, reach, most), frame, shapes, lists)
             limited = time.perf_counter() - started
-            face = LightGrid(settings, whole.bounds, len(light_mesh), grid, None, whole.static_hash, whole.dynamic_hash)
-            error = grid_error(face, light_mesh, nominal_radiosity(light_mesh), points)
+            face = replace(whole, settings=settings, static=grid, dynamic=None)
+            error = grid_error(face, light_mesh, light_mesh.nominal_radiosity, points)
             full = grid.occupancy
             rows.append(
                 (

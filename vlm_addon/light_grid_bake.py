@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings, LightGrid, nominal_radiosity
+from .core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings, LightGrid
 from .core.light_grid_error import GridError, grid_error
 from .core.light_mesh import VirtualLightMesh, empty_light_mesh
 from .core.light_scale import PROBES
@@ -134,7 +134,7 @@ def bake_light_grid(
     seconds = time.perf_counter() - start
     count = int(np.clip(_PAIRS // max(len(light_mesh), 1), _FEWEST_POINTS, _MOST_POINTS))
     points = random_surface_points(snapshot.meshes, count, seed=1)
-    error = grid_error(grid, light_mesh, nominal_radiosity(light_mesh), points)
+    error = grid_error(grid, light_mesh, light_mesh.nominal_radiosity, points)
     expected = grid.expected_error(points.positions) if settings.mode == TOLERANCE else None
     return GridBake(grid, seconds, error, expected)
 

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 from vlm_addon.blender.light_mesh_io import extract  # noqa: E402
 from vlm_addon.core.array_codec import content_hash  # noqa: E402
-from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid, nominal_radiosity  # noqa: E402
+from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid  # noqa: E402
 from vlm_addon.core.light_grid_error import grid_error  # noqa: E402
 from vlm_addon.core.range_grid import RangeGrid, RangeSettings  # noqa: E402
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh  # noqa: E402
@@ -62,7 +62,7 @@ def test_atrium(lights):
 def test_a_range_loses_light_and_a_long_one_or_a_tolerance_does_not():
     scene = opened("cornell_box")
     points = random_surface_points(scene.snapshot.meshes, 150)
-    radiosity = nominal_radiosity(scene.light_mesh)
+    radiosity = scene.light_mesh.nominal_radiosity
 
     def error(**settings):
         grid = LightGrid.bake(scene.light_mesh, scene.snapshot.bounds(), GridSettings(**settings))

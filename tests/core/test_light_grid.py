@@ -12,7 +12,7 @@ import pytest
 from tests.light_meshes import random_lights
 from vlm_addon.core.array_codec import content_hash
 from vlm_addon.core.errors import Cancelled, InvalidInput
-from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid, LitTree, nominal_radiosity
+from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid, LitTree
 from vlm_addon.core.light_mesh import empty_light_mesh
 from vlm_addon.core.light_tree_error import expected_error
 from vlm_addon.core.range_grid import RangeGrid, RangeSettings
@@ -109,7 +109,7 @@ def test_moving_dynamic_lights_rebuilds_nothing_static(settings):
 def test_relighting_changes_what_clusters_send_out_alone(settings):
     light_mesh = lights()
     grid = LightGrid.bake(light_mesh, BOX, settings)
-    lit = grid.relit(light_mesh, nominal_radiosity(light_mesh) * np.linspace(0.0, 2.0, 200)[:, None])
+    lit = grid.relit(light_mesh, light_mesh.nominal_radiosity * np.linspace(0.0, 2.0, 200)[:, None])
     if settings.mode == RANGE:
         assert content_hash(lit) == content_hash(grid)
         return

@@ -17,7 +17,7 @@ from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.passes.tile_bounds import TILE_SIDE
 
-TREES = ("static_tree", "dynamic_tree", "static_clusters", "dynamic_clusters")
+TREES = ("static_tree", "dynamic_tree", "window_factor", "scale", "static_clusters", "dynamic_clusters")
 PAGE = 4096
 
 
@@ -93,14 +93,14 @@ def test_a_moved_lamp_changes_only_what_clusters_send_out(own_device: Device) ->
     lights = wall_lights(box_room())
     own_device.render(scene_with_lamp_at(0.5), lights, settings())
     found = built(own_device.render(scene_with_lamp_at(0.6), lights, settings()))
-    assert found == {"static_tree": 0, "dynamic_tree": 0, "static_clusters": 1, "dynamic_clusters": 0}
+    assert found == dict.fromkeys(TREES, 0) | {"scale": 1, "static_clusters": 1}
 
 
 def test_a_turned_mesh_builds_only_the_tree_of_what_moves(own_device: Device) -> None:
     room = box_room()
     own_device.render(room, join([wall_lights(room), turning_lights(0.0)]), settings())
     found = built(own_device.render(room, join([wall_lights(room), turning_lights(0.1)]), settings()))
-    assert found == {"static_tree": 0, "dynamic_tree": 1, "static_clusters": 0, "dynamic_clusters": 1}
+    assert found == dict.fromkeys(TREES, 0) | {"dynamic_tree": 1, "dynamic_clusters": 1, "scale": 1}
 
 
 def test_a_grid_of_static_lights_is_kept_when_a_mesh_moves(own_device: Device) -> None:

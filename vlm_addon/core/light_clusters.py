@@ -83,11 +83,12 @@ def light_clusters(
     radiosity: Float64,
     tolerance: float,
     mean_irradiance: float | None = None,
+    window_factor: float = 1.0,
 ) -> LightClusters:
     """radiosity: (n, 3) float64, W/m², of all lights. tolerance: error of the irradiance, as a share of it.
 
     mean_irradiance: W/m², sum over the channels, over the surfaces that are to be lit; `room_irradiance` of the lights'
-    own surfaces where it is not given.
+    own surfaces where it is not given. window_factor: by how much windows are larger than the error model says.
     """
     if mean_irradiance is None:
         mean_irradiance = room_irradiance(light_mesh, radiosity)
@@ -111,7 +112,9 @@ def light_clusters(
         colour=sums[20:].T / lit[:, None],
         # A quarter of the disc that has the power at the mean radiosity of the lights, each by its power.
         least_squared=power * power / (4.0 * np.pi * np.maximum(sums[19], np.finfo(float).tiny)),
-        window=_windows(tree, lit, flux, axes, tolerance, tolerance * mean_irradiance, off_centre),
+        window=_nested(
+            tree, window_factor * _windows(tree, lit, flux, axes, tolerance, tolerance * mean_irradiance, off_centre)
+        ),
     )
 
 
@@ -204,8 +207,6 @@ def _windows(
     """(c,) m: where a cluster's error falls to `allowed` (W/m²); that of two causes by the sum of their squares.
 
     off_centre: (c,) m, of the power's mean from the centroid: a lit corner may be so much nearer than the whole.
-    Nested: a parent's window reaches a cluster's window and the distance between their centroids, so that the parent's
-    weight is nowhere less than the cluster's.
     """
     smallest = float(np.finfo(float).tiny)
     source = power / (np.pi * max(allowed, smallest))
@@ -214,7 +215,12 @@ def _windows(
     window = np.maximum(window, np.cbrt(_HORIZON_ERROR * source * _spread(axes)))
     radii = max(_NEAREST_RADII, (_COMMON_ERROR / max(tolerance, smallest)) ** 0.25)
     reach = np.maximum(radii * tree.radius, _NEAREST_SPREADS * np.linalg.norm(axes, axis=2).max(axis=1))
-    window = np.maximum(window, reach) + off_centre
+    return np.asarray(np.maximum(window, reach) + off_centre)
+
+
+def _nested(tree: LightTree, window: Float64) -> Float64:
+    """(c,) m: a parent's window reaches a cluster's window and the distance between their centroids, so that the
+    parent's weight is nowhere less than the cluster's."""
     for part in tree.depths():
         outer = tree.parent[part]
         if outer[0] != ROOT:

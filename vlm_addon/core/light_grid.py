@@ -29,6 +29,7 @@ from .range_grid import RangeGrid, RangeSettings
 from .scene import Float64
 from .settings import setting
 from .surface_points import NO_POINTS, SurfacePoints
+from .window_factor import window_factor
 
 TOLERANCE, RANGE = "tolerance", "range"
 STATIC, DYNAMIC = "static", "dynamic"
@@ -91,13 +92,14 @@ class LightGrid:
     """What was baked of a light mesh, immutable.
 
     bounds: (2, 3) m, what the grid of range mode covers. probes: points of what is lit: their mean
-    irradiance is the scale of a tolerance. static, dynamic: of the lights that stand and that move; None
+    irradiance is the scale of a tolerance. window_factor: of `window_factor.window_factor`. static, dynamic: of the lights that stand and that move; None
     where there are none. static_hash, dynamic_hash: of all that they depend on in the light mesh.
     """
 
     settings: GridSettings
     bounds: Float64
     probes: SurfacePoints
+    window_factor: float
     light_count: int
     static: RangeGrid | LitTree | None
     dynamic: RangeGrid | LitTree | None
@@ -119,14 +121,14 @@ class LightGrid:
         power over their area. That is too much, and the grid errs by more than the tolerance, where most light meets no
         surface; `surface_points.random_surface_points` makes probes of a scene's meshes.
 
-        In tolerance mode its clusters are lit by `nominal_radiosity` until `relit`. Raises InvalidInput for lights,
+        In tolerance mode its clusters are lit by its nominal radiosity until `relit`. Raises InvalidInput for lights,
         settings or bounds that cannot be used, Cancelled when `progress` says so.
         """
         settings = GridSettings() if settings is None else settings
         if not isinstance(settings, GridSettings):
             problem = f"they are of type {type(settings).__name__}"
             raise InvalidInput("settings of the light grid", problem, "give a GridSettings")
-        empty = cls(settings, finite_bounds(bounds), probes, 0, None, None, "", "")
+        empty = cls(settings, finite_bounds(bounds), probes, 1.0, 0, None, None, "", "")
         return empty.moved(light_mesh, progress)
 
     def moved(self, light_mesh: VirtualLightMesh, progress: Progress = silent) -> LightGrid:
@@ -140,7 +142,14 @@ class LightGrid:
             kept = hashes[-1] == old_hash
             made.append(_unlit(structure) if kept else self._built(light_mesh, chosen, progress))
         grid = replace(self, light_count=len(light_mesh), static_hash=hashes[0], dynamic_hash=hashes[1])
-        return grid._lit(made, light_mesh, nominal_radiosity(light_mesh))
+        if not (made[0] is not None and hashes[0] == old[0][1]):
+            grid = replace(grid, window_factor=grid._window_factor(made, light_mesh))
+        return grid._lit(made, light_mesh, light_mesh.nominal_radiosity)
+
+    def _window_factor(self, parts: list[Structure | None], light_mesh: VirtualLightMesh) -> float:
+        """Of what stands still, so that what moves does not change it; where all moves, of that."""
+        trees = [part for part in parts if isinstance(part, LightTree)]
+        return window_factor(trees[:1], light_mesh, self.settings.tolerance, self.probes)
 
     def _built(self, light_mesh: VirtualLightMesh, chosen: Bools, progress: Progress) -> Structure | None:
         if not chosen.any():
@@ -169,7 +178,7 @@ class LightGrid:
         mean = mean_irradiance(trees, light_mesh, radiosity, self.probes)
         tolerance = self.settings.tolerance
         static, dynamic = (
-            LitTree(part, light_clusters(part, light_mesh, radiosity, tolerance, mean))
+            LitTree(part, light_clusters(part, light_mesh, radiosity, tolerance, mean, self.window_factor))
             if isinstance(part, LightTree)
             else part
             for part in parts
@@ -248,11 +257,6 @@ class LightGrid:
 
 def _unlit(part: RangeGrid | LitTree | None) -> Structure | None:
     return part.tree if isinstance(part, LitTree) else part
-
-
-def nominal_radiosity(light_mesh: VirtualLightMesh) -> Float64:
-    """(n, 3) W/m²: of lights on which 1 W/m² of each channel falls."""
-    return np.asarray(light_mesh.strength[:, None] * (light_mesh.emission + light_mesh.colour), np.float64)
 
 
 def usable_radiosity(light_mesh: VirtualLightMesh, radiosity: npt.ArrayLike) -> Float64:

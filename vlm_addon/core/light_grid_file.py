@@ -27,7 +27,7 @@ from .range_grid import RangeGrid
 from .whole_file import atomic_output
 
 MAGIC = b"VLMGRID\n"
-VERSION = 2
+VERSION = 3
 # Magic word, version, length of the body, SHA-256 of all these and of the body.
 _HEADER = struct.Struct("<8sIQ32s")
 _TREE_LENGTH = struct.Struct("<Q")

@@ -6,6 +6,7 @@ A file whose checksum holds may still be another program's: nothing that reads a
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,7 @@ def require_sound(grid: LightGrid, light_mesh: VirtualLightMesh) -> None:
     """Raises InvalidInput where arrays do not fit each other or the light mesh."""
     _require_shapes(grid, _COMMON, {}, "")
     _require(grid.light_count == len(light_mesh), "light_count")
+    _require(1.0 <= grid.window_factor < math.inf, "window_factor")
     parts = (grid.static, grid.dynamic)
     for (name, chosen), part in zip(chosen_lights(light_mesh).items(), parts, strict=True):
         _require((part is not None) == chosen.any(), name)

@@ -71,6 +71,11 @@ class VirtualLightMesh:
         """(3,) float64: sum of area x reflectance x strength, m²: the power sent out under a unit irradiance."""
         return (self.areas * self.strength) @ self.colour.astype(np.float64)
 
+    @property
+    def nominal_radiosity(self) -> Float64:
+        """(n, 3) float64 W/m²: of lights on which 1 W/m² of each channel falls."""
+        return np.asarray(self.strength[:, None] * (self.emission + self.colour), np.float64)
+
 
 def empty_light_mesh() -> VirtualLightMesh:
     """A light mesh without lights."""

@@ -15,7 +15,7 @@ from .light_cut import cut_irradiance, light_cut
 from .light_mesh import VirtualLightMesh
 from .light_tree import LightTree
 from .light_tree_bounds import facing_height
-from .metrics import point_error
+from .metrics import point_error, within_tolerance
 from .scene import UNTAGGED, Float64, Int32
 
 Structure = tuple[LightTree, LightClusters]
@@ -42,8 +42,8 @@ class PointErrors:
         return float(np.quantile(self.errors, share)) if len(self.errors) else 0.0
 
     def within(self, tolerance: float) -> bool:
-        """Whether 95 % of the points err by at most the tolerance, and 99.9 % by at most three times as much."""
-        return self.quantile(0.95) <= tolerance and self.quantile(0.999) <= 3.0 * tolerance
+        """As `metrics.within_tolerance`."""
+        return within_tolerance(self.errors, tolerance)
 
 
 def tree_errors(

@@ -41,6 +41,14 @@ def point_error(values: Image, reference: Image) -> npt.NDArray[np.float64]:
     return np.asarray(np.abs(x - r) / np.maximum(r, max(floor, float(np.finfo(float).tiny))))
 
 
+def within_tolerance(errors: npt.NDArray[np.float64], tolerance: float) -> bool:
+    """Whether 95 % of the point errors are at most the tolerance, and 99.9 % at most three times as much."""
+    if not errors.size:
+        return True
+    most, nearly_all = np.quantile(errors, (0.95, 0.999))
+    return bool(most <= tolerance and nearly_all <= 3.0 * tolerance)
+
+
 def flip(image: Image, reference: Image) -> tuple[float, npt.NDArray[np.float32]]:
     """Mean FLIP difference in [0, 1] and its (h, w) map, for two linear pictures clipped to [0, 1] as displayed.
 

@@ -26,6 +26,7 @@ from ..core.progress import Progress
 from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
 from ..core.scene import Float32, SceneSnapshot
 from ..core.surface_points import random_surface_points
+from ..core.window_factor import window_factor
 from .kept import Kept
 from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
 from .passes.phase_two_range import GpuRangeGrid
@@ -47,8 +48,9 @@ class LightStructures:
 
     def trees(
         self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float
-    ) -> list[LitTree]:
-        """Trees of the static and of the dynamic lights, without those of no lights, and what they send out.
+    ) -> tuple[list[LitTree], float]:
+        """Trees of the static and of the dynamic lights, without those of no lights, with what they send out; and
+        the factor by which their windows are enlarged.
 
         snapshot, light_mesh: in world space. radiosity: (n, 3) W/m².
         """
@@ -60,6 +62,7 @@ class LightStructures:
                 shapes[kind] = lights_hash(light_mesh, chosen, TOLERANCE)
                 build = partial(build_light_tree, light_mesh, chosen)
                 trees[kind] = self._kept.get(f"{kind}_tree", shapes[kind], build)
+        factor = self._window_factor(snapshot, light_mesh, trees, shapes, tolerance)
         probes = random_surface_points(snapshot.meshes, PROBES)
         state = content_hash([*shapes.values(), radiosity, probes.positions, probes.normals, probes.tag_ids])
         mean = self._kept.get("scale", state, lambda: mean_irradiance(list(trees.values()), light_mesh, values, probes))
@@ -67,11 +70,27 @@ class LightStructures:
         for kind, tree in trees.items():
 
             def relight(tree: LightTree = tree) -> LitTree:
-                return LitTree(tree, light_clusters(tree, light_mesh, values, tolerance, mean))
+                return LitTree(tree, light_clusters(tree, light_mesh, values, tolerance, mean, factor))
 
-            state = content_hash([shapes[kind], radiosity[chosen_lights(light_mesh)[kind]], tolerance, mean])
+            state = content_hash([shapes[kind], radiosity[chosen_lights(light_mesh)[kind]], tolerance, mean, factor])
             result.append(self._kept.get(f"{kind}_clusters", state, relight))
-        return result
+        return result, factor
+
+    def _window_factor(
+        self,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh,
+        trees: dict[str, LightTree],
+        shapes: dict[str, str],
+        tolerance: float,
+    ) -> float:
+        """Of what stands still, so that what moves does not change it; where all lights move, of those."""
+        judged = STATIC if STATIC in trees else next(iter(trees), STATIC)
+        probes = random_surface_points(_static(snapshot).meshes, PROBES)
+        even = light_mesh.nominal_radiosity[chosen_lights(light_mesh)[judged]]
+        state = content_hash([shapes.get(judged), even, tolerance, probes.positions, probes.normals, probes.tag_ids])
+        judge = partial(window_factor, [trees[judged]] if trees else [], light_mesh, tolerance, probes)
+        return self._kept.get("window_factor", state, judge)
 
     def range_grids(
         self,
@@ -106,8 +125,13 @@ class LightStructures:
 
 def _bounds(snapshot: SceneSnapshot, only_static: bool) -> Bounds:
     """Of the surfaces that do not move, if there are any; else of all."""
+    return (_static(snapshot) if only_static else snapshot).bounds()
+
+
+def _static(snapshot: SceneSnapshot) -> SceneSnapshot:
+    """With the surfaces that do not move, if there are any; else with all."""
     static = tuple(mesh for mesh in snapshot.meshes if not mesh.dynamic and len(mesh.positions))
-    return replace(snapshot, meshes=static).bounds() if only_static and static else snapshot.bounds()
+    return replace(snapshot, meshes=static) if static else snapshot
 
 
 def _grid_on_device(

@@ -68,7 +68,7 @@ class FullSum(LightSum):
 class ClusteredSum(LightSum):
     """Near lights one by one, far ones by clusters, within a tolerance."""
 
-    kinds = ("static_tree", "dynamic_tree", "static_clusters", "dynamic_clusters")
+    kinds = ("static_tree", "dynamic_tree", "window_factor", "scale", "static_clusters", "dynamic_clusters")
 
     def __init__(
         self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer, tolerance: float
@@ -78,7 +78,7 @@ class ClusteredSum(LightSum):
         assert scene.world_lights is not None
         with scene.timer.measure("relight"):
             values = read_radiosity(radiosity, lights.count)
-            trees = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
+            trees, self._window_factor = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
             self._forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
@@ -87,8 +87,10 @@ class ClusteredSum(LightSum):
 
     def counters(self) -> dict[str, float]:
         """evaluated_per_pixel: lights and clusters in the list of a pixel's tile, mean over tiles that show a surface;
-        those that face away or lie below the horizon of all of it are still left out."""
+        those that face away or lie below the horizon of all of it are still left out. window_factor: see
+        core.window_factor."""
         return {
+            "window_factor": self._window_factor,
             "lists_entries": self._pass.entries,
             "lists_bytes": self._pass.nbytes,
             "evaluated_per_pixel": self._pass.entries / max(self._pass.tiles, 1),
