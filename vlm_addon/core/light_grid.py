@@ -91,9 +91,10 @@ class Candidates:
 class LightGrid:
     """What was baked of a light mesh, immutable.
 
-    bounds: (2, 3) m, what the grid of range mode covers. probes: points of what is lit: their mean
-    irradiance is the scale of a tolerance. window_factor: of `window_factor.window_factor`. static, dynamic: of the lights that stand and that move; None
-    where there are none. static_hash, dynamic_hash: of all that they depend on in the light mesh.
+    bounds: (2, 3) m, what the grid of range mode covers. probes: points of what is lit: their mean irradiance is the
+    scale of a tolerance. window_factor: how much larger windows are than the error model says (`window_factor`).
+    static, dynamic: of the lights that stand and that move; None where there are none. static_hash, dynamic_hash: of
+    all that they depend on in the light mesh.
     """
 
     settings: GridSettings
