@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.form_factor_cases import FLOAT32_ABSOLUTE, single, unit
+from tests.render.point_groups import GROUP, PREAMBLE, group_inputs
 from tests.render.shader_functions import evaluate
 from vlm_addon.core.form_factor import paired_form_factor
 from vlm_addon.render.device import Device
@@ -16,12 +17,6 @@ COUNT = 4000
 POINTS = 40
 NOTHING, FAR, WHOLE, CLIPPED = range(4)
 FAR_RADII = 16.0
-
-PREAMBLE = """
-int class_of(vec3 centre, vec3 extent, vec3 axis, vec3 bounds, vec3 a, vec3 b, vec3 c, vec3 area_vector, float radius) {
-    return light_class(PointGroup(centre, extent, axis, bounds.x, bounds.y, bounds.z), a, b, c, area_vector, radius);
-}
-"""
 
 Array = np.ndarray
 
@@ -46,18 +41,9 @@ def test_class_holds_for_every_point_of_the_group(device: Device, extent: float,
     stored = lights(random)
     points = single(random.uniform(-1, 1, (COUNT, 1, 3)) + extent * random.uniform(-1, 1, (COUNT, POINTS, 3)))
     normals = single(unit(unit(random.normal(size=(COUNT, 1, 3))) + spread * random.normal(size=(COUNT, POINTS, 3))))
-    axes = single(unit(normals.sum(axis=1)))
-    along = np.einsum("npc,nc->np", points, axes)
-    cosines = np.einsum("npc,nc->np", normals, axes)
-    low, high = points.min(axis=1), points.max(axis=1)
-    group = {
-        "centre": 0.5 * (low + high),
-        "extent": 0.5 * (high - low),
-        "axis": axes,
-        "bounds": np.stack([along.min(1), along.max(1), cosines.min(1)], axis=-1),
-    }
-    call = "float(class_of(centre, extent, axis, bounds, a, b, c, v, r))"
-    classes = evaluate(device, PATH, call, {**group, **stored}, preamble=PREAMBLE).astype(int)
+    inputs = {**group_inputs(points, normals), **stored}
+    call = f"float(light_class({GROUP}, a, b, c, v, r))"
+    classes = evaluate(device, PATH, call, inputs, preamble=PREAMBLE).astype(int)
     corners = corners_of(stored)
     heights = np.einsum("npkc,npc->npk", corners[:, None] - points[:, :, None], normals)
     distances = np.linalg.norm(corners.mean(axis=1)[:, None] - points, axis=-1) / stored["r"][:, None]

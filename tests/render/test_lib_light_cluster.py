@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from tests.form_factor_cases import single, unit
+from tests.render import point_groups
+from tests.render.point_groups import GROUP, group_inputs
 from tests.render.rooms import lights_from_triangles
 from tests.render.shader_functions import evaluate
 from vlm_addon.core.light_clusters import FADE, LightClusters, cluster_irradiance, light_clusters
@@ -27,9 +29,6 @@ LightNode node_of(vec3 c, float w, vec3 a, float plane, vec3 m, vec3 h, vec2 con
 }
 LightCluster cluster_of(vec3 m, vec3 x, vec3 y, float least, vec3 n, vec3 v, vec3 cv, vec3 pc, float pw) {
     return LightCluster(m, 0, x, pw, y, least, n, v, cv, vec3(0.0), pc);
-}
-PointGroup group_of(vec3 centre, vec3 extent, vec3 axis, vec3 bounds) {
-    return PointGroup(centre, extent, axis, bounds.x, bounds.y, bounds.z);
 }
 """
 NODE = "node_of(c, w, a, plane, middle, half_extent, cone)"
@@ -195,21 +194,10 @@ def test_what_gives_nothing_gives_nothing_to_any_point_of_the_group(
     centres = case.points()[:, None]
     points = single(centres + extent * case.random.uniform(-1.0, 1.0, (ROWS, count, 3)))
     normals = single(unit(case.normals()[:, None] + spread * case.random.normal(size=(ROWS, count, 3))))
-    axes = single(unit(normals.sum(axis=1)))
-    along = np.einsum("npc,nc->np", points, axes)
-    cosines = np.einsum("npc,nc->np", normals, axes)
-    low, high = points.min(axis=1), points.max(axis=1)
-    group = {
-        "group_centre": 0.5 * (low + high),
-        "extent": 0.5 * (high - low),
-        "axis": axes,
-        "bounds": np.stack([along.min(1), along.max(1), cosines.min(1)], axis=-1),
-    }
-    inputs = {**group, **case.inputs()}
-    call = "group_of(group_centre, extent, axis, bounds)"
-    nothing = evaluate(device, PATH, f"float(cluster_gives_nothing({call}, {NODE}))", inputs, preamble=PREAMBLE).astype(
-        bool
-    )
+    inputs = {**group_inputs(points, normals), **case.inputs()}
+    preamble = PREAMBLE + point_groups.PREAMBLE
+    call = f"float(cluster_gives_nothing({GROUP}, {NODE}))"
+    nothing = evaluate(device, PATH, call, inputs, preamble=preamble).astype(bool)
     rows = np.repeat(case.rows, count)
     exact = cluster_irradiance(case.tree, case.clusters, rows, points.reshape(-1, 3), normals.reshape(-1, 3))
     exact = exact.reshape(ROWS, count) / case.clusters.power[case.rows, None]
@@ -223,7 +211,7 @@ def test_what_gives_nothing_gives_nothing_to_any_point_of_the_group(
         assert 0.1 < nothing.mean() < 0.9
 
     distances = np.linalg.norm(points - case.tree.centroid[case.rows, None], axis=2)
-    call = f"vec3(distance_range({call}, c), 0.0)"
-    found = evaluate(device, PATH, call, inputs, 3, preamble=PREAMBLE)
+    call = f"vec3(distance_range({GROUP}, c), 0.0)"
+    found = evaluate(device, PATH, call, inputs, 3, preamble=preamble)
     assert (found[:, 0] <= distances.min(axis=1) + 1e-5).all()
     assert (found[:, 1] >= distances.max(axis=1) - 1e-5).all()
