@@ -4,7 +4,9 @@
 `./dev bench light_tree [lights …] [--points n]`. Errors are point errors (README) at random points of the visible
 surface, under smooth radiosity and under two spot lamps that light a patch each. `evaluated` counts form factors and
 cluster formulas computed for a point, `visited` all lights and clusters met on the way, most of which turn out to face
-away, to lie under the horizon or to be dark. Milliseconds are those of the processor, the least of three times.
+away, to lie under the horizon or to be dark. Milliseconds are those of the processor, the least of three times; what
+is measured is what renderers do: `build` is the tree and the factor of its windows, `relight` the scale and the
+clusters.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import argparse
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -21,12 +24,14 @@ from benchmarks.support import open_sample
 from vlm_addon.core.light_clusters import LightClusters, light_clusters
 from vlm_addon.core.light_cut import cut_irradiance
 from vlm_addon.core.light_mesh import VirtualLightMesh
+from vlm_addon.core.light_scale import PROBES, mean_irradiance
 from vlm_addon.core.light_tree import LightTree, build_light_tree
 from vlm_addon.core.light_tree_error import PointErrors, full_irradiance
 from vlm_addon.core.metrics import point_error
 from vlm_addon.core.scene import Float64
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.core.surface_points import SurfacePoints, random_surface_points
+from vlm_addon.core.window_factor import window_factor
 from vlm_addon.terminal import table
 
 T = TypeVar("T")
@@ -47,6 +52,7 @@ HEADER = (
     "most",
     "95th %",
     "99.9th %",
+    "windows x",
     "build ms",
     "relight ms",
     "MB",
@@ -55,7 +61,7 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Row:
-    """One setting: how many lights are lit, errors, and the most evaluations at a point."""
+    """One setting: how many lights are lit, errors, the most evaluations at a point, and the factor of windows."""
 
     lights: int
     radiosity: str
@@ -63,6 +69,7 @@ class Row:
     tolerance: float
     errors: PointErrors
     most_evaluated: int
+    factor: float
     build_ms: float
     relight_ms: float
     nbytes: int
@@ -81,10 +88,11 @@ def main() -> None:
 def campaign(lights: Sequence[int], points: int, tolerances: Sequence[float] = TOLERANCES) -> Iterator[Row]:
     """Every number of lights, radiosity and tolerance."""
     meshes = open_sample(SCENE).snapshot.meshes
-    at = random_surface_points(meshes, points)
+    # Not the points at which windows and scale are found.
+    at, probes = random_surface_points(meshes, points, seed=1), random_surface_points(meshes, PROBES)
     for count in lights:
         light_mesh = create_light_mesh(meshes, SimplifySettings(count, 1)).light_mesh
-        yield from rows(light_mesh, radiosities(light_mesh), at, tolerances)
+        yield from rows(light_mesh, radiosities(light_mesh), at, probes, tolerances)
 
 
 def radiosities(light_mesh: VirtualLightMesh) -> dict[str, Float64]:
@@ -104,18 +112,24 @@ def radiosities(light_mesh: VirtualLightMesh) -> dict[str, Float64]:
 
 
 def rows(
-    light_mesh: VirtualLightMesh, lightings: dict[str, Float64], at: SurfacePoints, tolerances: Sequence[float]
+    light_mesh: VirtualLightMesh,
+    lightings: dict[str, Float64],
+    at: SurfacePoints,
+    probes: SurfacePoints,
+    tolerances: Sequence[float],
 ) -> Iterator[Row]:
     """Of one light mesh. The radiosities are the channels of one full sum."""
     tags = np.zeros(len(at.positions), np.int32)
     channels = np.zeros((len(light_mesh), 3))
     channels[:, : len(lightings)] = np.stack(list(lightings.values()), axis=1)
     full = full_irradiance(light_mesh, channels, at.positions, at.normals, tags)
-    tree, build_ms = best(lambda: build_light_tree(light_mesh))
+    tree, tree_ms = best(lambda: build_light_tree(light_mesh))
+    factors = {t: best(partial(window_factor, [tree], light_mesh, t, probes)) for t in tolerances}
     for channel, (name, values) in enumerate(lightings.items()):
         radiosity = np.column_stack([values, np.zeros((len(values), 2))])
         for tolerance in tolerances:
-            clusters, relight_ms = relit(tree, light_mesh, radiosity, tolerance)
+            factor, factor_ms = factors[tolerance]
+            clusters, relight_ms = best(partial(relit, tree, light_mesh, radiosity, tolerance, factor, probes))
             cut = cut_irradiance(tree, clusters, light_mesh, radiosity, at.positions, at.normals, tags)
             errors = point_error(cut.irradiance[:, 0], full[:, channel])
             yield Row(
@@ -125,17 +139,24 @@ def rows(
                 tolerance=tolerance,
                 errors=PointErrors(errors, float(cut.evaluated.mean()), float(cut.visited.mean())),
                 most_evaluated=int(cut.evaluated.max()),
-                build_ms=build_ms,
+                factor=factor,
+                build_ms=tree_ms + factor_ms,
                 relight_ms=relight_ms,
                 nbytes=tree.nbytes + clusters.nbytes,
             )
 
 
 def relit(
-    tree: LightTree, light_mesh: VirtualLightMesh, radiosity: Float64, tolerance: float
-) -> tuple[LightClusters, float]:
-    """The clusters and the milliseconds they took."""
-    return best(lambda: light_clusters(tree, light_mesh, radiosity, tolerance))
+    tree: LightTree,
+    light_mesh: VirtualLightMesh,
+    radiosity: Float64,
+    tolerance: float,
+    factor: float,
+    probes: SurfacePoints,
+) -> LightClusters:
+    """As renderers relight."""
+    mean = mean_irradiance([tree], light_mesh, radiosity, probes)
+    return light_clusters(tree, light_mesh, radiosity, tolerance, mean, factor)
 
 
 def best(work: Callable[[], T]) -> tuple[T, float]:
@@ -158,6 +179,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         f"{row.most_evaluated}",
         f"{100 * row.errors.quantile(0.95):.2f}",
         f"{100 * row.errors.quantile(0.999):.2f}",
+        f"{row.factor:.2f}",
         f"{row.build_ms:.0f}",
         f"{row.relight_ms:.0f}",
         f"{1e-6 * row.nbytes:.2f}",
