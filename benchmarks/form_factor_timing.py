@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 
 from benchmarks.form_factor_forms import FORMS, RATIONAL_FIT, Form, stored_with
+from tests.render.rooms import split
 from vlm_addon.core.scene import Float64
 from vlm_addon.render.device import Device
 from vlm_addon.render.gpu_layout import VIRTUAL_LIGHT
@@ -104,7 +105,7 @@ def room(random: np.random.Generator, tiles: int = TILES) -> Workload:
     offsets = random.uniform(-0.05, 0.05, (tiles * TILE_POINTS, 3))
     offsets -= normals * (offsets * normals).sum(axis=1, keepdims=True)
     points = np.repeat(centres, TILE_POINTS, axis=0) + offsets
-    boxes = [_split(_box(random.uniform(0.1, 2.0), ROOM_M), times) for count, times in BOXES for _ in range(count)]
+    boxes = [split(_box(random.uniform(0.1, 2.0), ROOM_M), times) for count, times in BOXES for _ in range(count)]
     smallest, largest = np.log(LAMP_SIZES_M)
     size = np.exp(random.uniform(smallest, largest, (LAMPS, 1, 1)))
     lamps = random.uniform(0.0, 1.0, (LAMPS, 1, 3)) * ROOM_M + size * _unit(random.normal(size=(LAMPS, 3, 3)))
@@ -195,13 +196,3 @@ def _box(margin: float, size: Float64) -> Float64:
     triangles = corners[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
     outward = (stored_with(triangles)[0] * (triangles.mean(axis=1) - 0.5 * size)).sum(axis=1) > 0.0
     return np.where(outward[:, None, None], triangles[:, ::-1], triangles)
-
-
-def _split(triangles: Float64, times: int) -> Float64:
-    """Each triangle as four, `times` over."""
-    for _ in range(times):
-        a, b, c = np.moveaxis(triangles, 1, 0)
-        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        triangles = np.concatenate([np.stack(part, axis=1) for part in parts])
-    return triangles

@@ -13,9 +13,8 @@ import time
 import numpy as np
 
 from benchmarks.support import open_sample
-from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
+from tests.render.rooms import lights_from_triangles, split
 from vlm_addon.core.progress import silent
-from vlm_addon.core.scene import Float64
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.passes.accumulate import read_image
@@ -45,7 +44,7 @@ def main() -> None:
         phase_two = PhaseTwoPass(context, device.shaders, *SIZE)
         rows = []
         for splits in SPLITS:
-            lights = _as_lights(_split(corners, splits))
+            lights = lights_from_triangles(split(corners, splits))
             records = GpuVirtualLights(context, lights, geometry.origin)
             radiosity = context.buffer(np.ones((len(lights), 4), np.float32).tobytes())
             wall, processor = np.inf, np.inf
@@ -72,33 +71,6 @@ def main() -> None:
             )
         print(f"{device.name}, {SIZE[0]} x {SIZE[1]}, {shown} pixels show a surface")
     print(table(HEADER, rows))
-
-
-def _split(corners: Float64, times: int) -> Float64:
-    """Each triangle as four, `times` over."""
-    for _ in range(times):
-        a, b, c = np.moveaxis(corners, 1, 0)
-        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-        corners = np.concatenate(
-            [np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-        )
-    return corners
-
-
-def _as_lights(corners: Float64) -> VirtualLightMesh:
-    count = len(corners)
-    return VirtualLightMesh(
-        vertices=corners.reshape(-1, 3),
-        triangles=np.arange(3 * count, dtype=np.int32).reshape(count, 3),
-        colour=np.zeros((count, 3), np.float32),
-        emission=np.ones((count, 3), np.float32),
-        strength=np.ones(count, np.float32),
-        tag_ids=np.zeros(count, np.int32),
-        dynamic=np.zeros(count, bool),
-        samples=SourceSamples(
-            np.zeros((0, 3)), np.zeros((0, 3), np.float32), np.zeros(0, np.float32), np.zeros(count + 1, np.int32)
-        ),
-    )
 
 
 if __name__ == "__main__":
