@@ -123,7 +123,8 @@ float cell_form_factor(Lamp lamp, vec3 p, vec3 n) {
 LampRay lamp_ray(Lamp lamp, vec3 p) {
     float disk = FORM_FACTOR_PI * lamp.sample_weight;
     if (lamp.kind == LAMP_SUN) {
-        return LampRay(lamp.sample_position, lamp.intensity, disk * lamp.radius * lamp.radius);
+        float solid_angle = lamp.world_solid_angle > 0.0 ? lamp.world_solid_angle : disk * lamp.radius * lamp.radius;
+        return LampRay(lamp.sample_position, lamp.intensity, solid_angle);
     }
     vec3 to_sample = lamp.sample_position - p;
     float distance_squared = max(dot(to_sample, to_sample), 1e-30);

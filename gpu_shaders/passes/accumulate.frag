@@ -16,6 +16,14 @@ uniform vec3 camera_backward;   // unit
 uniform bool is_orthographic;
 uniform vec3 world_radiance;    // W/(m² sr)
 uniform float weight;           // one over the number of pictures
+#ifdef ENVIRONMENT_UNIT
+#include "lib/environment.glsl"
+layout(binding = ENVIRONMENT_UNIT) uniform sampler2D environment_map;   // W/(m² sr)
+// In the map's frame: through the picture's lower left corner, and what a pixel to the right and up adds.
+uniform vec3 background_corner;
+uniform vec3 background_right;
+uniform vec3 background_up;
+#endif
 
 layout(location = 0) out vec4 out_combined;
 layout(location = 1) out vec4 out_direct;       // w: share of the pixel that shows geometry
@@ -25,7 +33,12 @@ layout(location = 3) out vec4 out_irradiance;
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     if (!pixel_shows_geometry(pixel)) {
-        out_combined = weight * vec4(world_radiance, 1.0);
+        vec3 background = world_radiance;
+#ifdef ENVIRONMENT_UNIT
+        vec3 ray = background_corner + gl_FragCoord.x * background_right + gl_FragCoord.y * background_up;
+        background += textureLod(environment_map, environment_place(ray), 0.0).rgb;
+#endif
+        out_combined = weight * vec4(background, 1.0);
         out_direct = out_indirect = out_irradiance = vec4(0.0);
         return;
     }

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.errors import InvalidInput
 from ..core.scene import Camera, Float64, Light, Mesh, SceneSnapshot
+from ..core.world_light import is_lit_by_world
 from .color_space import working_to_rec709
 from .evaluation import TEMPORARY_PROPERTY, evaluate
 from .lamps import read_camera, read_light
@@ -67,8 +68,9 @@ def require_camera(snapshot: SceneSnapshot) -> Camera:
 
 
 def require_lights(snapshot: SceneSnapshot) -> tuple[Light, ...]:
-    """The lamps of the snapshot. Raises InvalidInput where there is neither a lamp nor an emissive surface."""
-    if not snapshot.lights and not any(mesh.emission.any() for mesh in snapshot.meshes):
+    """The lamps of the snapshot. Raises InvalidInput where neither a lamp, a surface nor the world sends out light."""
+    shines = is_lit_by_world(snapshot) or any(mesh.emission.any() for mesh in snapshot.meshes)
+    if not snapshot.lights and not shines:
         problem = "nothing in it sends out light"
         raise InvalidInput(f"scene {snapshot.name!r}", problem, "add a light (Add > Light) or an emissive material")
     return snapshot.lights
@@ -99,7 +101,7 @@ class _Extraction:
         scene = self._depsgraph.scene
         for instance in self._depsgraph.object_instances:
             self._visit(instance, meshes, lights)
-        world = read_world(scene.world, self._materials.evaluator, self._report)
+        radiance, environment = read_world(scene.world, self._to_rec709, self._report)
         camera = self._camera(scene)
         return SceneSnapshot(
             name=scene.name,
@@ -108,7 +110,8 @@ class _Extraction:
             textures=tuple(self._materials.textures),
             lights=tuple(lights),
             camera=camera,
-            world_radiance=world,
+            world_radiance=radiance,
+            environment=environment,
             frame=scene.frame_current,
             findings=self._report.findings,
         )

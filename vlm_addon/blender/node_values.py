@@ -96,6 +96,13 @@ class NodeEvaluator:
         sampling = Sampling(uv, node.extension == "REPEAT", node.interpolation != "Closest")
         return SurfaceValue(pixels, ("image", *key), sampling)
 
+    def environment(self, endpoint: Endpoint, owner: str, report: Callable[[str, str], None]) -> SurfaceValue:
+        """The picture of an Environment Texture node: on a surface, whose directions are not known here, its mean."""
+        node = endpoint.node
+        report(f"{node.bl_label} is not simulated", "replaced by one average value")
+        pixels = None if node.image is None else image_pixels(node.image, self.to_rec709, False, report)
+        return constant_color(np.array(MISSING_COLOR, np.float32) if pixels is None else pixels.mean(axis=(0, 1)))
+
     def _uv_source(self, endpoint: Endpoint, owner: str) -> UvSource:
         if endpoint.is_constant:
             return UvSource()
@@ -147,6 +154,10 @@ Handler = Callable[[NodeEvaluator, Endpoint, str, Callable[[str, str], None]], S
 def _image_texture(evaluator: NodeEvaluator, endpoint: Endpoint, owner: str, report: Any) -> SurfaceValue:
     value = evaluator.image(endpoint, owner, report)
     return replace(value, channel=3) if endpoint.socket.name == "Alpha" else value
+
+
+def _environment_texture(evaluator: NodeEvaluator, endpoint: Endpoint, owner: str, report: Any) -> SurfaceValue:
+    return evaluator.environment(endpoint, owner, report)
 
 
 def _color_attribute(evaluator: NodeEvaluator, endpoint: Endpoint, owner: str, report: Any) -> SurfaceValue:
@@ -292,6 +303,7 @@ def _average(evaluator: NodeEvaluator, endpoint: Endpoint, owner: str) -> Surfac
 
 _HANDLERS: dict[str, Handler] = {
     "TEX_IMAGE": _image_texture,
+    "TEX_ENVIRONMENT": _environment_texture,
     "VERTEX_COLOR": _color_attribute,
     "ATTRIBUTE": _color_attribute,
     "RGB": _constant_output,

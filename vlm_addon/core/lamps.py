@@ -9,7 +9,8 @@ The units, each confirmed by renders of Cycles 5.0 (benchmarks/light_units.py):
 - SPOT: a point lamp whose intensity does not depend on the cone, times smoothstep((z - c) / ((1 - c) blend)) with c
   the cosine of half the cone and z the cosine against the axis, after the direction's x and y were divided by
   `spot_scale`.
-- SUN: power is the irradiance on a facing surface; its angle spreads the same light over a cone of directions.
+- SUN: power is the irradiance on a facing surface; its angle spreads the same light over a cone of directions. One
+  from the world brings its power from its axis alone: many of them together are the sum that stands for an integral.
 - AREA: a Lambertian emitter on its -z side: radiosity = power / area, radiance = power / (pi area).
 """
 
@@ -60,7 +61,9 @@ class LampSample:
 
 def is_soft(light: Light) -> bool:
     """Whether different points of the lamp cast different shadows."""
-    return light.kind == AREA or (light.angle if light.kind == SUN else light.radius) > 0.0
+    if light.kind == SUN:
+        return light.angle > 0.0 and not light.from_world
+    return light.kind == AREA or light.radius > 0.0
 
 
 def area_of(light: Light) -> float:
@@ -245,7 +248,7 @@ def lamp_irradiance(light: Light, points: Float64, normals: Float64) -> Float64:
         factors = polygon_form_factor(points, normals, area_polygons(light)).sum(axis=1)
         return factors[:, None] * power / area_of(light)
     if light.kind == SUN:
-        sine = math.sin(0.5 * light.angle)
+        sine = 0.0 if light.from_world else math.sin(0.5 * light.angle)
         return horizon_cosine(normals @ np.array(light.z_axis), np.full(len(points), sine))[:, None] * power
     offsets = np.array(light.position) - points
     squared = np.maximum((offsets**2).sum(-1), 1e-300)

@@ -101,7 +101,8 @@ class Light:
     soft_falloff: its lamp is a disk turned to each receiver (Blender's default) rather than a ball.
     angle: full angular diameter of a SUN. spot_angle: full cone angle; spot_blend: 0 hard to 1 soft. size_x, size_y:
     m, full extents of an AREA light of `shape` RECTANGLE or ELLIPSE. spot_scale: the object's scale relative to its
-    z axis, which squashes the cone in x and y.
+    z axis, which squashes the cone in x and y. from_world: a SUN that stands for what a part of the world sends, a
+    cone of `angle`; all of it comes along the axis, with a hard shadow.
     """
 
     name: str
@@ -121,6 +122,7 @@ class Light:
     size_y: float = 1.0
     casts_shadow: bool = True
     soft_falloff: bool = True
+    from_world: bool = False
 
 
 @dataclass(frozen=True)
@@ -176,9 +178,23 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Environment:
+    """What the world sends from each direction, as an equirectangular map.
+
+    radiance: (h, w, 3) float32, linear Rec.709, W/(m² sr), finite, at least 0; row 0 at the bottom looks along -z of
+    the map, its middle column along +x, columns to the left of it towards +y (Blender's mapping). map_from_world:
+    (3, 3) float64, directions in the map = map_from_world @ directions in world space.
+    """
+
+    name: str
+    radiance: Float32
+    map_from_world: Float64
+
+
+@dataclass(frozen=True)
 class SceneSnapshot:
-    """All that one frame shows. world_radiance: background, linear Rec.709, W/(m² sr). findings: what extraction
-    had to approximate or leave out."""
+    """All that one frame shows. world_radiance: of the world, the same from everywhere, linear Rec.709, W/(m² sr);
+    environment: what comes on top of it by direction. findings: what extraction had to approximate or leave out."""
 
     name: str
     meshes: tuple[Mesh, ...] = ()
@@ -189,6 +205,7 @@ class SceneSnapshot:
     world_radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     frame: int = 1
     findings: tuple[Finding, ...] = field(default=())
+    environment: Environment | None = None
 
     @property
     def triangle_count(self) -> int:

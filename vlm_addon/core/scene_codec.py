@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .light_mesh import SourceSamples, VirtualLightMesh
-from .scene import Camera, Finding, Light, Material, Mesh, SceneSnapshot, Texture
+from .scene import Camera, Environment, Finding, Light, Material, Mesh, SceneSnapshot, Texture
 
 
 def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -26,6 +26,7 @@ def snapshot_from_tree(tree: Mapping[str, Any]) -> SceneSnapshot:
         world_radiance=tuple(tree["world_radiance"]),
         frame=tree["frame"],
         findings=tuple(Finding(**item) for item in tree["findings"]),
+        environment=Environment(**tree["environment"]) if tree["environment"] is not None else None,
     )
 
 

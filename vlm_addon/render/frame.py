@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.array_codec import content_hash
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.progress import Progress, step
 from ..core.scene import Camera, Finding, Float32, SceneSnapshot
 from ..core.settings import from_mapping
+from ..core.world_light import is_lit_by_world, world_lights
 from .frame_types import Frame, RenderSettings, require_in_range
 from .geometry import GpuGeometry
 from .local_space import LocalSpace, make_local_space
@@ -19,6 +22,7 @@ from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
 from .passes.shadow_map import LampShadows
+from .picture_shares import picture_shares
 from .technique import FrameInputs, SceneInputs, technique_by_name
 from .view import make_view, require_usable
 
@@ -44,6 +48,10 @@ def render_frame(
     )
     _require_renderable(snapshot, light_mesh, settings)
     context, shaders, timer = device.context, device.shaders, device.timer()
+    lamps = len(snapshot.lights)
+    if is_lit_by_world(snapshot):
+        with timer.measure("world lights"):
+            snapshot = _with_world_lights(device, snapshot, settings)
     width, height = settings.width, settings.height
     # From here on nothing is in world space but what is read back.
     space = make_local_space(snapshot)
@@ -72,14 +80,17 @@ def render_frame(
     technique = technique_type(scene, chosen)
     direct_light = DirectLightPass(context, shaders, width, height)
     gbuffer_pass = GBufferPass(context, shaders, width, height)
-    accumulate = AccumulatePass(context, shaders, width, height)
+    accumulate = AccumulatePass(context, shaders, width, height, snapshot.environment)
+    shares = picture_shares(local.lights, settings.samples)
 
     for sample, jitter in enumerate(jitter_offsets(settings.samples)):
         view = make_view(camera, width, height, geometry.origin, tuple(jitter))
         with timer.measure("G-buffer"):
             gbuffer = gbuffer_pass.render(geometry, view, sample)
         with timer.measure("direct light"):
-            direct = direct_light.render(gbuffer, shadows, view, sample, settings.samples, settings.shadow_samples)
+            direct = direct_light.render(
+                gbuffer, shadows, view, sample, settings.samples, settings.shadow_samples, shares[sample]
+            )
         share = (1.0 - PREPARED) / settings.samples
         sample_progress = _within(progress, PREPARED + sample * share, share)
         irradiance = technique.indirect(FrameInputs(view, gbuffer, sample, sample_progress))
@@ -100,7 +111,8 @@ def render_frame(
         del images["irradiance"]
     counters = {
         "triangles": geometry.triangle_count,
-        "lights": len(snapshot.lights),
+        "lights": lamps,
+        "world_lights": len(snapshot.lights) - lamps,
         "samples": settings.samples,
         **technique.counters(),
     }
@@ -117,6 +129,13 @@ def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | 
     require_usable(snapshot.camera)
     if light_mesh is not None:
         require_valid(light_mesh)
+
+
+def _with_world_lights(device: Device, snapshot: SceneSnapshot, settings: RenderSettings) -> SceneSnapshot:
+    """`snapshot` with the lights of its world after its lamps. Raises InvalidInput."""
+    world = (snapshot.world_radiance, snapshot.environment, settings.world_lights)
+    lights = device.kept.get("world_lights", content_hash(list(world)), lambda: world_lights(*world))
+    return replace(snapshot, lights=(*snapshot.lights, *lights))
 
 
 def _localised(space: LocalSpace, snapshot: SceneSnapshot) -> tuple[SceneSnapshot, Camera]:

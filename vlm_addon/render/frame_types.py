@@ -18,6 +18,7 @@ class RenderSettings:
     technique_settings: values by name, checked against the technique's own settings dataclass. samples: jittered
     pictures averaged per pixel (box filter of one pixel). shadow_samples: points of a
     soft lamp, in phase one and at least in the finished picture. buffers: also return every intermediate image.
+    world_lights: directions that stand for what the world sends, each with a shadow map; none where it is black.
     """
 
     width: int
@@ -28,9 +29,17 @@ class RenderSettings:
     shadow_resolution: int = 1024
     shadow_samples: int = 32
     buffers: bool = False
+    world_lights: int = 64
 
 
-LIMITS = {"width": 16384, "height": 16384, "samples": 4096, "shadow_resolution": 8192, "shadow_samples": 1024}
+LIMITS = {
+    "width": 16384,
+    "height": 16384,
+    "samples": 4096,
+    "shadow_resolution": 8192,
+    "shadow_samples": 1024,
+    "world_lights": 1024,
+}
 """The largest value of each number in RenderSettings; the smallest is 1."""
 
 

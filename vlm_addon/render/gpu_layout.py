@@ -154,6 +154,7 @@ LAMP = GpuStruct(
         ("int", "shadow_kind"),
         ("float", "sample_weight"),
         ("float", "shadow_rounding"),
+        ("float", "world_solid_angle"),
     ),
 )
 """One sample of a lamp and the frame of its shadow map; filled by render/lamp_records.py, read by lib/lights.glsl.
@@ -164,6 +165,7 @@ radiosity of its cell over the cell's share, W/m². corners: pairs of (x, y) on 
 clockwise seen from its shining side. shadow_extent: tangent of half the field of view, for SHADOW_PARALLEL half the
 size in m. shadow_origin: where the map's coordinates and depths start; shadow_centre: of a parallel map, m from there.
 shadow_near: m, nearest distance in a perspective map. shadow_rounding: m, what float32 leaves of a surface's place.
+world_solid_angle: sr, of the part of the world that a LAMP_SUN without radius stands for; 0 for a lamp.
 """
 
 SOURCE_SAMPLE = GpuStruct(

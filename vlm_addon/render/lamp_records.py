@@ -36,7 +36,10 @@ def lamp_record(light: Light, sample: LampSample, origin: Float64) -> np.ndarray
         record["spot_scale"] = np.maximum(light.spot_scale, LEAST_SPOT_SCALE)
     if light.kind == SUN:
         record["intensity"] = power
-        record["radius"] = math.sin(0.5 * light.angle)
+        if light.from_world:
+            record["world_solid_angle"] = 4.0 * math.pi * math.sin(0.25 * light.angle) ** 2
+        else:
+            record["radius"] = math.sin(0.5 * light.angle)
         _set_axes(record, sample.position)
     if light.kind == AREA:
         area = area_of(light) * sample.share

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.scene import Float32, Float64
+from ...core.scene import Environment, Float32, Float64
 from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 DIRECT_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
 IRRADIANCE_UNIT = DIRECT_UNIT + 1
 SPECULAR_UNIT = DIRECT_UNIT + 5
+ENVIRONMENT_UNIT = DIRECT_UNIT + 4
 OUTPUTS = ("combined", "direct", "indirect", "irradiance")
 
 
@@ -31,7 +32,17 @@ class AccumulatePass:
     stays in its pixel.
     """
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        width: int,
+        height: int,
+        environment: Environment | None = None,
+    ) -> None:
+        """environment: what shows where no surface does, on top of the same from everywhere."""
+        self._environment = environment
+        self._environment_map = None if environment is None else _environment_texture(context, environment)
         self._context = context
         self._shaders = shaders
         self._sums = [context.texture((width, height), 4, dtype="f4") for _ in OUTPUTS]
@@ -62,6 +73,9 @@ class AccumulatePass:
         if specular is not None:
             defines["HAS_SPECULAR"] = True
             specular.use(SPECULAR_UNIT)
+        if self._environment_map is not None:
+            defines["ENVIRONMENT_UNIT"] = ENVIRONMENT_UNIT
+            self._environment_map.use(ENVIRONMENT_UNIT)
         combine = FullscreenPass(self._context, self._shaders, "passes/accumulate.frag", defines)
         gbuffer.bind()
         self._albedo.bind()
@@ -76,11 +90,34 @@ class AccumulatePass:
                 "weight": weight,
             },
         )
+        if self._environment is not None:
+            set_uniforms(combine.program, _background_rays(view, self._environment))
         combine.draw(self._framebuffer, additive=True)
 
     def read(self) -> dict[str, Float32]:
         """The sums by the names of OUTPUTS: (h, w, 4) float32, row 0 at the top; `direct` has coverage as alpha."""
         return {name: read_image(texture) for name, texture in zip(OUTPUTS, self._sums, strict=True)}
+
+
+def _environment_texture(context: moderngl.Context, environment: Environment) -> moderngl.Texture:
+    import moderngl
+
+    height, width = environment.radiance.shape[:2]
+    texture = context.texture(
+        (width, height), 3, np.ascontiguousarray(environment.radiance, "<f4").tobytes(), dtype="f4"
+    )
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    texture.repeat_x, texture.repeat_y = True, False
+    return texture
+
+
+def _background_rays(view: View, environment: Environment) -> dict[str, Float64]:
+    """Uniforms: direction in the map's frame through the picture's corner, and by how much it differs for a pixel."""
+    rays = view.rays.copy()
+    if view.is_orthographic:
+        rays[0] = -view.backward
+    corner, right, up = rays @ environment.map_from_world.T
+    return {"background_corner": corner, "background_right": right, "background_up": up}
 
 
 def read_image(texture: moderngl.Texture) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...core.scene import Float64
 from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS, LAMP
@@ -63,11 +64,12 @@ class DirectLightPass:
         sample_index: int,
         sample_count: int,
         shadow_samples: int,
+        light_shares: Float64 | None = None,
     ) -> moderngl.Texture:
         """Radiance in W/(m² sr) that each pixel sends to the eye, RGBA32F with w 0; 0 where no surface shows.
 
-        Over all samples a soft lamp gets at least `shadow_samples` points: few show as steps in its penumbra. The
-        next call overwrites the texture.
+        Over all samples a soft lamp gets at least `shadow_samples` points: few show as steps in its penumbra.
+        light_shares: (n,) weight of each light in this picture, 1 by default. The next call overwrites the texture.
         """
         self._framebuffer.clear()
         self._albedo.bind()
@@ -80,7 +82,8 @@ class DirectLightPass:
         windows: tuple[ViewWindow, ...] = (ALL_DISTANCES,)
         if any(uses_windows):
             windows = view_windows(view, *shadows.bounds, *self._distances.measure(gbuffer, view))
-        for lamp in range(len(shadows.lights)):
+        shares = np.ones(len(shadows.lights)) if light_shares is None else light_shares
+        for lamp in np.flatnonzero(shares).tolist():
             # A picture of few samples still gets enough points of each soft lamp.
             together = shadows.samples_of(lamp, -(-shadow_samples // sample_count))
             for part in range(together):
@@ -88,7 +91,7 @@ class DirectLightPass:
                 for part_of_view in windows if uses_windows[lamp] else (ALL_DISTANCES,):
                     shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together, part_of_view.window)
                     outer = part_of_view.outer if part_of_view.outer < math.inf else 0.0
-                    uniforms = {"weight": 1.0 / together, "distances": (outer, part_of_view.inner)}
+                    uniforms = {"weight": shares[lamp] / together, "distances": (outer, part_of_view.inner)}
                     self._add(gbuffer, shadow_map, camera | uniforms | dict(self._uniforms))
         return self.images[0]
 

@@ -32,8 +32,10 @@ FRONT_FACE = 5
 CUBE_TILES = (int(CONSTANTS["SHADOW_CUBE_COLUMNS"]), int(CONSTANTS["SHADOW_CUBE_ROWS"]))
 # A map of one tile has this many times the cube's texels per side: about as many in all.
 SINGLE_TILE_FACTOR = 2
-# Maps of soft lamps are this much coarser: many of them are averaged, and drawn for every picture.
+# Maps of soft lamps and of wide parts of the world are this much coarser: many of them are averaged.
 SOFT_DIVISOR = 2
+SHARP_ANGLE = math.radians(4.0)
+"""Light from the world that comes from less than this is a sun by itself."""
 LEAST_RESOLUTION = 16
 # Texels around what must be seen, for the filter.
 MARGIN = 2.0
@@ -96,7 +98,8 @@ class ShadowMapPass:
 
     def _face(self, light: Light) -> int:
         """Texels along a cube's face."""
-        return max(self._resolution // (SOFT_DIVISOR if is_soft(light) else 1), LEAST_RESOLUTION)
+        is_blurred = is_soft(light) or (light.from_world and light.angle > SHARP_ANGLE)
+        return max(self._resolution // (SOFT_DIVISOR if is_blurred else 1), LEAST_RESOLUTION)
 
     def render(
         self,
@@ -323,7 +326,8 @@ class LampShadows:
 
     def samples_of(self, lamp_index: int, most: int) -> int:
         """How many samples of a lamp differ, at most `most`."""
-        return most if self._changes(self.lights[lamp_index]) else 1
+        light = self.lights[lamp_index]
+        return most if self._changes(light) and not light.from_world else 1
 
     def _changes(self, light: Light) -> bool:
         """Whether samples differ: points of a soft lamp, or occluders that are let through by chance."""
