@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from . import blend
-from .shapes import Shape, box, moved, patch, turned
+from .shapes import Shape, box, moved, room_walls, turned
 from .vessels import tea_pot
 
 ROOM = (5.0, 5.0, 3.2)  # across, deep, high
@@ -38,21 +38,6 @@ POTS = (
 )
 
 
-def walls() -> dict[str, Shape]:
-    """The six walls facing inwards; y runs away from the camera, which stands inside."""
-    width, depth, height = ROOM
-    left, right = -width / 2, width / 2
-    x, y, z = (width, 0, 0), (0, depth, 0), (0, 0, height)
-    return {
-        "Floor": patch((left, 0, 0), x, y),
-        "Ceiling": patch((left, 0, height), y, x),
-        "Far wall": patch((left, depth, 0), x, z),
-        "Near wall": patch((left, 0, 0), z, x),
-        "Red wall": patch((left, 0, 0), y, z),
-        "Green wall": patch((right, 0, 0), z, y),
-    }
-
-
 def blocks() -> dict[str, Shape]:
     """Two blocks, turned against the walls, their bottoms on the floor."""
     large = turned(box((-0.5, -0.45, 0), (0.5, 0.45, LARGE_BLOCK_HEIGHT)), math.radians(-18))
@@ -69,7 +54,7 @@ def build(pots: int = 0) -> None:
         "Green wall": blend.diffuse("Green", GREEN),
         "Small block": blend.diffuse("Ochre", OCHRE),
     }
-    for name, part in (walls() | blocks()).items():
+    for name, part in (room_walls(ROOM, "Red wall", "Green wall") | blocks()).items():
         blend.add_mesh(scene, name, part, colors.get(name, white))
     if pots:
         data = blend.mesh_data("Tea pot", tea_pot(POT_RADIUS), [blend.principled("Glaze", POT, roughness=0.35)])

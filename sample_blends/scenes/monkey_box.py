@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import blend
-from .shapes import Shape, patch, shape
+from .shapes import Shape, room_walls, shape
 
 BOX = (4.0, 4.0, 3.0)  # across, deep, high
 FLOATER_CENTRE = (0.0, 2.2, 1.3)
@@ -26,21 +26,6 @@ RENDER_LEVELS, VIEWPORT_LEVELS = 3, 1
 WHITE, RED, BLUE = (0.75, 0.75, 0.75), (0.63, 0.10, 0.08), (0.12, 0.22, 0.60)
 FLOATER_COLOR = (0.60, 0.55, 0.46)
 SPOT_POWER_W, SPOT_DEGREES = 300.0, 62.0
-
-
-def walls() -> dict[str, Shape]:
-    """The six walls facing inwards; the camera stands inside, in front of the near one."""
-    width, depth, height = BOX
-    left, right = -width / 2, width / 2
-    x, y, z = (width, 0, 0), (0, depth, 0), (0, 0, height)
-    return {
-        "Floor": patch((left, 0, 0), x, y),
-        "Ceiling": patch((left, 0, height), y, x),
-        "Far wall": patch((left, depth, 0), x, z),
-        "Near wall": patch((left, 0, 0), z, x),
-        "Red wall": patch((left, 0, 0), y, z),
-        "Blue wall": patch((right, 0, 0), z, y),
-    }
 
 
 def longest_quad_ring(cage: Any) -> list[Any]:
@@ -132,7 +117,7 @@ def build(mesh_path: Path | None = None) -> None:
     scene = blend.empty_scene("monkey_box", 640, 480)
     white = blend.diffuse("White", WHITE)
     colors = {"Red wall": blend.diffuse("Red", RED), "Blue wall": blend.diffuse("Blue", BLUE)}
-    for name, wall in walls().items():
+    for name, wall in room_walls(BOX, "Red wall", "Blue wall").items():
         blend.add_mesh(scene, name, wall, colors.get(name, white))
     add_floater(scene, mesh_path)
     blend.add_spot(scene, "Spot", SPOT_POWER_W, (1.2, 0.3, 2.6), (-0.2, 2.35, 1.05), SPOT_DEGREES, 0.25, 0.05)

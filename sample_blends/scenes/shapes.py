@@ -111,6 +111,22 @@ def patch(
     return replace(shape(vertices, faces), uvs=uvs)
 
 
+def room_walls(size: Sequence[float], left_name: str, right_name: str) -> dict[str, Shape]:
+    """The six walls of a room (across, deep, high), facing inwards; the floor is at z = 0, its near edge at y = 0 and
+    its middle at x = 0."""
+    width, depth, height = size
+    left, right = -width / 2, width / 2
+    x, y, z = (width, 0, 0), (0, depth, 0), (0, 0, height)
+    return {
+        "Floor": patch((left, 0, 0), x, y),
+        "Ceiling": patch((left, 0, height), y, x),
+        "Far wall": patch((left, depth, 0), x, z),
+        "Near wall": patch((left, 0, 0), z, x),
+        left_name: patch((left, 0, 0), y, z),
+        right_name: patch((right, 0, 0), z, y),
+    }
+
+
 def grid_faces(columns: int, rows: int, closed: bool = False) -> list[Face]:
     """Quads over a row-major grid of points; closed: each row is a ring of `columns` points, else columns + 1."""
     stride = columns if closed else columns + 1
