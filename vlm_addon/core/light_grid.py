@@ -20,6 +20,7 @@ from .errors import InvalidInput
 from .grid_frame import Bounds, as_numbers, finite_bounds, finite_points
 from .light_clusters import LightClusters, light_clusters
 from .light_cut import light_cut
+from .light_grid_levels import grid_levels, tree_levels
 from .light_mesh import VirtualLightMesh, require_valid
 from .light_scale import mean_irradiance
 from .light_tree import LightTree, build_light_tree
@@ -202,7 +203,7 @@ class LightGrid:
         """How full each level of each structure is, JSON-able: of a range grid its cells and blocks, of a tree its
         levels, finest first. places: cells, blocks or clusters; entries: lights and clusters in all of them."""
         return {
-            name: _tree_levels(structure) if isinstance(structure, LitTree) else _grid_levels(structure)
+            name: tree_levels(structure.tree) if isinstance(structure, LitTree) else grid_levels(structure)
             for name, structure in self.structures
         }
 
@@ -308,31 +309,3 @@ def _by_point(parts: list[_Pairs], point_count: int) -> tuple[Int64, npt.NDArray
     order = np.lexsort((ids, owners))
     counts = np.bincount(owners, minlength=point_count)
     return np.concatenate(([0], np.cumsum(counts))), ids[order].astype(np.uint32), weights[order]
-
-
-def _grid_levels(grid: RangeGrid) -> list[dict[str, Any]]:
-    occupancy = grid.occupancy
-    cut = {
-        "overflowing": len(occupancy.overflowing_cells),
-        "dropped_entries": occupancy.dropped_entries,
-        "dropped_lights": len(occupancy.dropped_lights),
-    }
-    cells = _level("cells", grid.lists.cell_counts())
-    return [cells | cut, _level("blocks", grid.lists.block_counts)]
-
-
-def _tree_levels(lit: LitTree) -> list[dict[str, Any]]:
-    tree = lit.tree
-    inside = np.diff(tree.light_offsets) + np.diff(tree.child_offsets)
-    return [_level(f"level {level}", inside[tree.level == level]) for level in np.unique(tree.level)]
-
-
-def _level(name: str, counts: npt.NDArray[Any]) -> dict[str, Any]:
-    entries, places = int(counts.sum(dtype=np.int64)), len(counts)
-    return {
-        "name": name,
-        "places": places,
-        "entries": entries,
-        "mean": entries / places,
-        "fullest": int(counts.max(initial=0)),
-    }
