@@ -313,6 +313,12 @@ def test_maps_that_need_too_much_memory_get_smaller_and_say_so(device: Device, m
     assert any("1.00 times" in reason for reason in frame.reasons)
 
 
+def test_strength_multiplies_all_of_the_indirect_light(device: Device) -> None:
+    once, twice = (rendered(device, glossy(0.5), strength=strength) for strength in (1.0, 2.0))
+    for name in ("irradiance", "lightwave_specular"):
+        np.testing.assert_allclose(twice.images[name], 2.0 * once.images[name], rtol=1e-5)
+
+
 def test_lights_are_drawn_where_they_stand(device: Device) -> None:
     picture = rendered(device, furnished(SPOT_LAMP)).images["lightwave_lights"]
     assert picture.shape == (HEIGHT, WIDTH, 3)

@@ -48,13 +48,13 @@ class GpuWave:
     solid_angle: float
 
 
-def upload_wave(context: moderngl.Context, wave: Wave, space: LocalSpace) -> GpuWave:
-    """The wave in local space."""
+def upload_wave(context: moderngl.Context, wave: Wave, space: LocalSpace, strength: float) -> GpuWave:
+    """The wave in local space, its light times `strength`."""
     rows = np.zeros((max(len(wave), 1), 3, 4), np.float32)
     rows[: len(wave), 0, :3] = space.local_points(wave.positions)
     rows[: len(wave), 1, :3] = wave.normals
-    rows[: len(wave), 2, :3] = wave.irradiance
-    rows[: len(wave), :, 3] = wave.specular_irradiance
+    rows[: len(wave), 2, :3] = strength * wave.irradiance
+    rows[: len(wave), :, 3] = strength * wave.specular_irradiance
     rays = max(np.count_nonzero(wave.shells == wave.shells.max(initial=0)), 1)
     return GpuWave(context.buffer(rows.tobytes()), len(wave), 2.0 * math.pi / rays)
 

@@ -86,6 +86,13 @@ class Settings:
         source="000, 4.2",
         choices=(CORNERS, PIXELS),
     )
+    strength: float = setting(
+        1.0,
+        "times",
+        0.0,
+        100.0,
+        "Brightness of the indirect light; at 1 a lamp's light is that at the mean distance to the end of the scene",
+    )
     specular: bool = setting(True, "", None, None, "Lights also show in glossy surfaces", source="000, eq. 4.5")
     shadows: str = setting(
         ACCURATE,
@@ -138,7 +145,7 @@ class LightWave(Technique):
         self._has_specular = settings.specular and glossy
         self._waves = self._found_waves()
         self._sum = WaveLightPass(context, shaders, self._has_specular)
-        self._gpu_waves = [upload_wave(context, wave, scene.space) for wave in self._waves]
+        self._gpu_waves = [upload_wave(context, wave, scene.space, settings.strength) for wave in self._waves]
         self._map_scale = self._allowed_scale()
         self._maps = self._found_maps()
         self._store.end()
