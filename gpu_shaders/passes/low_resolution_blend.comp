@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fills in the pixels that look like their neighbours in the low-resolution G-buffer, and marks and counts the others,
-// one count a group (seed 001, 3.5).
+// Fills in the pixels that look like their neighbours in the low-resolution G-buffer (seed 001, 3.5) where these have
+// much the same result, and marks and counts the others, one count a group.
 #include "passes/gbuffer_samplers.glsl"
+
+#define LARGE 3e38
 
 layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
 
@@ -15,6 +17,7 @@ layout(std430, binding = SHOWN_BINDING) buffer Shown { uint shown; };
 
 uniform float normal_threshold;     // length of the difference of unit normals
 uniform float position_threshold;   // share of the picture's width
+uniform float value_threshold;      // share of the largest result around a pixel
 uniform float width_at_0, width_per_depth; // of the picture, m: width_at_0 + width_per_depth x depth
 
 shared uint group_shown, group_redone;
@@ -35,6 +38,7 @@ bool blend(ivec2 pixel) {
     vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
     float reach = position_threshold * (width_at_0 + width_per_depth * place.w);
     vec4 sum = vec4(0.0);
+    vec3 lowest = vec3(LARGE), highest = vec3(-LARGE);
     float total = 0.0;
     for (int k = 0; k < 4; ++k) {
         ivec2 step = ivec2(k & 1, k >> 1);
@@ -49,10 +53,15 @@ bool blend(ivec2 pixel) {
         if (!is_alike) {
             return false;
         }
-        sum += weight * texelFetch(low_result, texel, 0);
+        vec4 found = texelFetch(low_result, texel, 0);
+        lowest = min(lowest, found.rgb);
+        highest = max(highest, found.rgb);
+        sum += weight * found;
         total += weight;
     }
-    if (total == 0.0) {
+    vec3 size = max(abs(lowest), abs(highest)), range = highest - lowest;
+    float largest = max(max(size.r, size.g), size.b);
+    if (total == 0.0 || max(max(range.r, range.g), range.b) > value_threshold * largest) {
         return false;
     }
     imageStore(result, pixel, sum / total);

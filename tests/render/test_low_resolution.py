@@ -27,7 +27,7 @@ from vlm_addon.render.view import View, make_view
 
 Function = Callable[[Float32, Float32], Float32]
 """(h, w, 4) of positions and normals, (h, w, 4) each."""
-NEVER = LowResolutionSettings(2, 3.0, 1e6)
+NEVER = LowResolutionSettings(2, 3.0, 1e6, 2.0)
 """Thresholds that nothing reaches."""
 
 
@@ -118,7 +118,7 @@ def test_what_is_linear_over_the_picture_is_found_exactly_whatever_the_size(
 
 
 def test_pixels_beside_a_jump_are_gathered_and_each_once(device: Device) -> None:
-    run = Run(device, room_with_block(), jumping, LowResolutionSettings(2, 0.2, 0.5))
+    run = Run(device, room_with_block(), jumping, LowResolutionSettings(2, 0.2, 0.5, 2.0))
     np.testing.assert_allclose(run.image, run.full, atol=1e-6)
     low, redone = run.asked
     on_steps = np.argwhere(run.shown[::-1][::2, ::2])[:, ::-1] * 2
@@ -139,7 +139,7 @@ def test_neighbours_far_behind_do_not_count_though_they_face_the_same_way(device
     def is_near(position: Float32) -> Float32:
         return np.repeat(position[..., 2:3] > 0.25, 4, axis=2)
 
-    exact = Run(device, scene, lambda p, n: is_near(p), LowResolutionSettings(2, 3.0, 0.1))
+    exact = Run(device, scene, lambda p, n: is_near(p), LowResolutionSettings(2, 3.0, 0.1, 2.0))
     assert (exact.image == exact.full).all()
     assert 0.5 < exact.counters["low_resolution_share"] < 1.0
     blurred = Run(device, scene, lambda p, n: is_near(p), NEVER)
@@ -176,7 +176,7 @@ def splinters() -> Iterator[tuple[float, float]]:
 
 def test_share_falls_with_the_thresholds(device: Device) -> None:
     shares = [
-        Run(device, room_with_block(), smooth, LowResolutionSettings(2, 0.2, reach)).counters["low_resolution_share"]
+        Run(device, room_with_block(), smooth, LowResolutionSettings(2, 0.2, reach, 2.0)).counters["low_resolution_share"]
         for reach in (1.0, 0.2, 0.08, 0.06, 0.01)
     ]
     assert shares == sorted(shares, reverse=True)
@@ -190,8 +190,27 @@ def test_orthographic_camera_has_the_same_threshold_at_every_depth(device: Devic
     for eye in (camera, far):
         scene = replace(wall(), camera=eye)
         for reach, share in ((1.5 * step / 2.0, 1.0), (0.9 * step / 2.0, 0.25)):
-            run = Run(device, scene, smooth, LowResolutionSettings(2, 0.2, reach), (40, 40))
+            run = Run(device, scene, smooth, LowResolutionSettings(2, 0.2, reach, 2.0), (40, 40))
             assert run.counters["low_resolution_share"] == pytest.approx(share, abs=0.05)
+
+
+def test_a_step_in_the_result_alone_is_found(device: Device) -> None:
+    """On a wall that is even: what is gathered jumps from 1 to 1.5 at x = 0.1."""
+
+    def step(position: Float32, normal: Float32) -> Float32:
+        return np.repeat(1.0 + 0.5 * (position[..., :1] > 0.1), 4, axis=2)
+
+    exact = Run(device, wall(), step, LowResolutionSettings(2, 0.2, 0.1, 0.3))
+    assert (exact.image == exact.full).all()
+    assert 0.9 < exact.counters["low_resolution_share"] < 1.0
+    blurred = Run(device, wall(), step, LowResolutionSettings(2, 0.2, 0.1, 0.4))
+    assert not (blurred.image == blurred.full).all()
+    assert blurred.counters["low_resolution_share"] == 1.0
+
+
+def test_results_without_light_are_alike(device: Device) -> None:
+    run = Run(device, wall(), lambda p, n: np.zeros_like(p), LowResolutionSettings(2, 0.2, 0.1, 0.0))
+    assert run.counters["low_resolution_share"] == 1.0
 
 
 def test_a_picture_without_surfaces(device: Device) -> None:

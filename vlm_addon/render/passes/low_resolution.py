@@ -75,6 +75,14 @@ class LowResolutionSettings:
         "its depth; 0: all are",
         source="001, 3.5: discontinuity threshold",
     )
+    value_threshold: float = setting(
+        0.1,
+        "share",
+        0.0,
+        2.0,
+        "Difference between the neighbours' results, of the largest of them, above which a pixel is gathered on its "
+        "own, as beside a light; 2: none is for that",
+    )
 
 
 @dataclass(frozen=True)
@@ -238,9 +246,10 @@ class LowResolutionGather:
         self._shown.orphan()
         self._shown.write(bytes(4))
         self._shown.bind_to_storage_buffer(SHOWN_BINDING)
-        at_0, per_depth = _picture_width(view, self._size[0])
+        at_0, per_depth = view.picture_width(self._size[0])
         settings = self._settings
         uniforms = {"normal_threshold": settings.normal_threshold, "position_threshold": settings.position_threshold}
+        uniforms["value_threshold"] = settings.value_threshold
         set_uniforms(self._blend, {**uniforms, "width_at_0": at_0, "width_per_depth": per_depth})
         self._blend.run(*self._groups)
         self._context.memory_barrier()
@@ -276,10 +285,3 @@ class LowResolutionGather:
         set_uniforms(self._scatter, {"count": count})
         self._scatter.run(*packed.groups)
         self._context.memory_barrier()
-
-
-def _picture_width(view: View, width: int) -> tuple[float, float]:
-    """How much a picture of `width` pixels shows across, m: at depth 0, and more of it for each m of depth."""
-    if view.is_orthographic:
-        return 2.0 / float(np.linalg.norm(view.clip_from_local[0, :3])), 0.0
-    return 0.0, width * float(np.linalg.norm(view.rays[1]))
