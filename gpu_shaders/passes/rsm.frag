@@ -4,7 +4,7 @@
 #include "lib/rsm.glsl"
 
 // Cosine of a surface that the lamp grazes: bounds the area that its texel covers.
-#define LEAST_COSINE 1e-3
+#define GRAZING_COSINE 1e-3
 
 layout(std430, binding = LAMP_BINDING) readonly buffer Lamps { Lamp lamps[]; };
 layout(std430, binding = RESULT_BINDING) buffer Brightest { uint brightest[3]; }; // bits of floats from 0, W/m²
@@ -35,7 +35,7 @@ void main() {
     vec3 to_lamp = is_sun ? lamp.sample_position : lamp.sample_position - surface.position;
     float distance_squared = dot(to_lamp, to_lamp);
     float cosine = dot(surface.geometric_normal, to_lamp) * inversesqrt(max(distance_squared, 1e-30));
-    float area = (is_sun ? measure : measure * distance_squared) / max(cosine, LEAST_COSINE);
+    float area = (is_sun ? measure : measure * distance_squared) / max(cosine, GRAZING_COSINE);
     vec3 received = lamp_irradiance(lamp, surface.position, surface.geometric_normal) * (lamp.sample_weight * area);
     vec3 flux = diffuse_reflectance(surface, albedo_table) * received;
     out_position = vec4(surface.position, surface.depth);

@@ -24,8 +24,8 @@ uniform float most_age;
 #define SAME_PIXEL (1.0 / 256.0)
 
 bool is_usable(vec4 value) {
-    // Not so for NaN.
-    return all(lessThan(abs(value), vec4(1e30)));
+    // As whole numbers: drivers may take any comparison with NaN for true.
+    return all(lessThan(floatBitsToUint(value) & 0x7fffffffu, uvec4(floatBitsToUint(1e30))));
 }
 
 vec4 history_of(ivec2 pixel, out float pictures) {
@@ -57,7 +57,7 @@ vec4 history_of(ivec2 pixel, out float pictures) {
         vec4 value = texelFetch(history_irradiance, texel, 0);
         // Pixels aside are elsewhere along the surface: only the distance from it tells another surface.
         bool is_same = seen.w > 0.0 && abs(dot(seen.xyz - p, n)) < reach
-            && dot(texelFetch(history_normal, texel, 0).xyz, n) > LEAST_COSINE;
+            && dot(texelFetch(history_normal, texel, 0).xyz, n) > SAME_NORMAL_COSINE;
         if (is_same && is_usable(value)) {
             sum += weight * value;
             total += weight;

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import moderngl
 
 GROUP_SIDE = 8
-LEAST_COSINE = 0.9
+SAME_NORMAL_COSINE = 0.9
 """Between normals of what counts as the same surface."""
 FIRST_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
 UNLIMITED = (math.inf, math.inf, math.inf)
@@ -89,7 +89,7 @@ class TemporalPass:
         names = ("HISTORY_IRRADIANCE", "HISTORY_PLACE", "HISTORY_NORMAL")
         history_units = {f"{name}_UNIT": FIRST_UNIT + index for index, name in enumerate(names)}
         found_units = {f"{name}_UNIT": FIRST_UNIT + index for index, name in enumerate(("FOUND", "REPROJECTED", "AGE"))}
-        defines = {"GROUP_SIDE": GROUP_SIDE, "LEAST_COSINE": LEAST_COSINE}
+        defines = {"GROUP_SIDE": GROUP_SIDE, "SAME_NORMAL_COSINE": SAME_NORMAL_COSINE}
         self._reproject = shaders.compute("passes/temporal_reproject.comp", {**defines, **history_units})
         self._blend = shaders.compute("passes/temporal_blend.comp", {**defines, **found_units})
         self._picture: _Picture | None = None
