@@ -238,6 +238,12 @@ LIGHT_CLUSTER = GpuStruct(
 """What a cluster sends out: core.light_clusters.LightClusters. first_axis, second_axis: from the mean to two of its
 four points. normal: flux over power. variances (xx, yy, zz), covariances (xy, yz, xz): of normals. power: rgb, W."""
 
+VIRTUAL_POINT_LIGHT = GpuStruct(
+    "VirtualPointLight",
+    (("vec3", "position"), ("float", "area"), ("vec3", "normal"), ("vec3", "flux")),
+)
+"""core.vpl.VirtualPointLights, in metres from the local origin and watts; area of the piece of surface, m²."""
+
 STRUCTS: dict[str, GpuStruct] = {
     struct.name: struct
     for struct in (
@@ -251,6 +257,7 @@ STRUCTS: dict[str, GpuStruct] = {
         POINT_GROUP,
         LIGHT_NODE,
         LIGHT_CLUSTER,
+        VIRTUAL_POINT_LIGHT,
     )
 }
 """What `#include "gpu_layout/Name"` finds."""

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Second-order illumination by point lights and negative point lights (seed 001; Cochran and Steele 2007)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.array_codec import content_hash
+from ...core.halton import halton_points
+from ...core.progress import Progress
+from ...core.scene import Float32
+from ...core.settings import setting
+from ...core.surface_points import SurfacePoints, random_surface_points
+from ..gpu_layout import VIRTUAL_POINT_LIGHT
+from ..indirect_lights import IndirectLights, light_records
+from ..passes.accumulate import read_image
+from ..passes.gbuffer import GBuffer
+from ..passes.low_resolution import LowResolutionGather, LowResolutionSettings, PickedPixels, SizedPasses
+from ..passes.point_lights import GROUP_SIDE, LIGHT_BINDING, BoundPass, PointLightPass, PointLights, uploaded
+from ..passes.rsm import LampReflections
+from ..shader_library import ShaderLibrary, set_uniforms
+from ..technique import FrameInputs, SceneInputs, Technique
+from ..view import View
+
+if TYPE_CHECKING:
+    import moderngl
+
+NEGATIVE_GROUP_SIZE = 64
+PIXEL_BINDING, NEGATIVE_BINDING = 1, 2
+BOUND_RECEIVERS = 512
+"""Surface points where it is measured what the bounded geometry term takes off."""
+LEAST_FLUX = 1e-4
+"""Of a negative light that counts, of the strongest one."""
+MARK_RADIUS = 1
+"""Of a light's mark in its picture, pixels."""
+WHITE, BLUE = (1.0, 1.0, 1.0), (0.1, 0.3, 1.0)
+DIMMED = 0.3
+"""Of the base colour behind the marks."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How many lights there are and where they are looked up."""
+
+    indirect_lights: int = setting(
+        200, "count", 0, 4096, "Point lights on what the lamps light, shared by all lamps", source="001, 3.1, table 1"
+    )
+    negative_lights: int = setting(
+        100,
+        "count",
+        0,
+        4096,
+        "Places in the picture where lights may take away what a surface there stops; 0: nothing is occluded",
+        source="001, 3.3, table 1",
+    )
+    resolution: int = setting(
+        256, "texels", 8, 2048, "Along a face of a lamp's map, to the nearest power of two", source="001, 4"
+    )
+    area_maps: int = setting(
+        4, "count", 1, 64, "Points of an area lamp that have a map each; one in its middle is off near the lamp"
+    )
+
+
+@dataclass(frozen=True)
+class Settings(LowResolutionSettings, Placement):
+    """Lights, and where a low resolution does."""
+
+
+class NegativeLightPass:
+    """Places negative lights on pixels of a picture."""
+
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
+        self._context = context
+        bindings = {"LIGHT_BINDING": LIGHT_BINDING, "PIXEL_BINDING": PIXEL_BINDING}
+        defines = {**bindings, "NEGATIVE_BINDING": NEGATIVE_BINDING, "GROUP_SIZE": NEGATIVE_GROUP_SIZE}
+        self._shader = shaders.compute("techniques/second_order_negative.comp", defines)
+
+    def render(self, gbuffer: GBuffer, view: View, lights: PointLights, count: int, picture: int) -> PointLights:
+        """`count` of them, those without flux where light stops nowhere. picture: each takes other pixels."""
+        width, height = gbuffer.size
+        places = halton_points(count, first=1 + picture * count)
+        pixels = (places * (width, height)).astype(np.int32)
+        pixel_buffer = self._context.buffer(pixels.tobytes())
+        found = PointLights(self._context.buffer(reserve=VIRTUAL_POINT_LIGHT.dtype.itemsize * count), count)
+        gbuffer.bind()
+        lights.buffer.bind_to_storage_buffer(LIGHT_BINDING)
+        pixel_buffer.bind_to_storage_buffer(PIXEL_BINDING)
+        found.buffer.bind_to_storage_buffer(NEGATIVE_BINDING)
+        at_0, per_depth = (across / width for across in view.picture_width(width))
+        uniforms = {"light_count": lights.count, "pixels_each": width * height / count}
+        uniforms |= {"width_at_0": at_0, "width_per_depth": per_depth, "is_orthographic": view.is_orthographic}
+        uniforms |= {"camera_position": view.position.tolist(), "camera_backward": view.backward.tolist()}
+        set_uniforms(self._shader, uniforms)
+        self._shader.run(count)
+        self._context.memory_barrier()
+        return found
+
+
+class SecondOrder(Technique):
+    """One diffuse bounce from point lights on what the lamps light, less what negative point lights take away.
+
+    Known bias: a light shines through everything; negative lights make up for that where the camera sees a surface's
+    dark side, as a glow of the mean direction, and nowhere else: no shadow falls from what hides its dark side from the
+    camera, and shadows have no edges. Few lights make each of them visible as a spot. The bounded geometry term darkens
+    corners; as much light as it takes off all surfaces together is given back evenly (counter bound_removes_share).
+    Light of glowing surfaces does not bounce, surfaces reflect on their counter-clockwise side only, and a lamp that
+    casts no shadow still bounces off the nearest surface alone. Where lamps outnumber lights, the brightest lit
+    surfaces stand for all.
+    """
+
+    name = "second_order"
+    label = "Second-order illumination"
+    description = "One diffuse bounce from point lights on lit surfaces, with negative lights for what is occluded"
+    settings = Settings
+
+    def __init__(self, scene: SceneInputs, settings: Any) -> None:
+        super().__init__(scene, settings)
+        context, shaders = scene.context, scene.shaders
+        self._maps = LampReflections(context, shaders, scene.kept, scene.world, settings.resolution, settings.area_maps)
+        with scene.timer.measure("reflective shadow maps"):
+            self._maps.draw()
+            self._placed = IndirectLights(context, shaders, self._maps)
+        width, height = scene.settings.width, scene.settings.height
+        self._negative_pass = NegativeLightPass(context, shaders)
+        self._passes = SizedPasses(lambda wide, high: PointLightPass(context, shaders, wide, high))
+        self._low = LowResolutionGather(context, shaders, width, height, settings, scene.settings.buffers)
+        self._finish = shaders.compute("techniques/second_order_finish.comp", {"GROUP_SIDE": GROUP_SIDE})
+        self._removed: float | None = None
+        self._lights = self._negative = self._none = uploaded(context, VIRTUAL_POINT_LIGHT.zeros(0))
+        self._irradiance: moderngl.Texture | None = None
+        self._frame: FrameInputs | None = None
+
+    def indirect(self, frame: FrameInputs) -> moderngl.Texture:
+        """Sum over the lights of flux times the bounded geometry term, less that of the negative ones."""
+        timer, chosen = self.scene.timer, self.chosen
+        with timer.measure("indirect lights"):
+            self._lights = self._placed_lights()
+        self._negative = self._none
+        if self._lights.count and chosen.negative_lights:
+            with timer.measure("negative lights"):
+                self._negative = self._negative_pass.render(
+                    frame.gbuffer, frame.view, self._lights, chosen.negative_lights, frame.sample_index
+                )
+        with timer.measure("gather"):
+            self._irradiance = self._low.render(
+                frame.gbuffer, frame.view, lambda picked: self._gathered(picked, self._negative, frame.progress)
+            )
+            self._irradiance.bind_to_image(0)
+            self._finish.run(*(-(-side // GROUP_SIDE) for side in self._irradiance.size))
+            self.scene.context.memory_barrier()
+        self._frame = frame
+        return self._irradiance
+
+    def _placed_lights(self) -> PointLights:
+        """The next picture's indirect lights, on the device."""
+        context, space = self.scene.context, self.scene.space
+        found = self._placed.take(self.chosen.indirect_lights, self.scene.settings.samples)
+        if self._removed is None:
+            receivers = self._receivers()
+            points = space.local_points(receivers.positions)
+            bound = BoundPass(context, self.scene.shaders, points, receivers.normals)
+            brightest = float(self._placed.brightest.mean())
+            self._removed = bound.share(uploaded(context, light_records(found, space)), brightest)
+        return uploaded(context, light_records(found, space, 1.0 / (1.0 - self._removed)))
+
+    def _receivers(self) -> SurfacePoints:
+        """Points of all surfaces, the same for the same scene."""
+        meshes = self.scene.world.meshes
+        key = content_hash([[mesh.positions, mesh.triangles] for mesh in meshes])
+        return self.scene.kept.get("surface_receivers", key, lambda: random_surface_points(meshes, BOUND_RECEIVERS))
+
+    def _gathered(self, picked: PickedPixels, negative: PointLights, progress: Progress) -> moderngl.Texture:
+        brightest = self._placed.brightest
+        return self._passes.of(picked.gbuffer).render(picked.gbuffer, self._lights, negative, brightest, progress)
+
+    def counters(self) -> dict[str, float]:
+        """Of the last picture: lights; negative lights that take something away and how much, W, mean of the channels;
+        shares of the light that they and the bounded term take off. Of the frame: share of pixels for which the low
+        resolution did, maps, maps that were drawn."""
+        negative = _strong(self._negative)
+        return {
+            "indirect_lights": self._lights.count,
+            "negative_lights": len(negative),
+            "negative_flux": float(negative["flux"].mean(axis=1).sum()) * self.scene.space.unit**2,
+            "negative_removes_share": self._negative_share(),
+            "bound_removes_share": self._removed or 0.0,
+            **self._low.counters(),
+            "reflective_maps": len(self._maps),
+            "reflective_maps_drawn": self._maps.drawn,
+        }
+
+    def _negative_share(self) -> float:
+        if self._irradiance is None:
+            return 0.0
+        image = read_image(self._irradiance)
+        kept, taken = float(image[..., :3].mean(axis=2).sum()), float(image[..., 3].sum())
+        return taken / (kept + taken) if taken > 0.0 else 0.0
+
+    def images(self) -> dict[str, Float32]:
+        """Irradiance from either kind of light at full resolution, where the low resolution did not do, what was found
+        at low resolution, and the lights in the picture: white, negative ones blue."""
+        frame = self._frame
+        if frame is None:
+            return {}
+        whole = PickedPixels(frame.gbuffer, frame.gbuffer.ids)
+        positive = read_image(self._gathered(whole, self._none, frame.progress))[..., :3]
+        taken = positive - read_image(self._gathered(whole, self._negative, frame.progress))[..., :3]
+        found = {"positive": positive, "negative": np.maximum(taken, 0.0), **self._low.images()}
+        found["lights"] = self._marked(frame)
+        return {f"{self.name}_{name}": np.ascontiguousarray(image, np.float32) for name, image in found.items()}
+
+    def _marked(self, frame: FrameInputs) -> Float32:
+        """Base colour with a mark for each light, over everything that may hide it."""
+        image = DIMMED * read_image(frame.gbuffer.base_color)[..., :3]
+        for records, colour in ((self._lights.records(), WHITE), (_strong(self._negative), BLUE)):
+            for column, row in _pixels_of(records["position"], frame.view, image.shape[1], image.shape[0]):
+                rows, columns = (slice(max(at - MARK_RADIUS, 0), at + MARK_RADIUS + 1) for at in (row, column))
+                image[rows, columns] = colour
+        return image
+
+
+def _strong(lights: PointLights) -> np.ndarray:
+    """Records of those that take something away that could be seen."""
+    records = lights.records()
+    flux = records["flux"].max(axis=1, initial=0.0)
+    return records[flux > LEAST_FLUX * flux.max(initial=0.0)]
+
+
+def _pixels_of(positions: Float32, view: View, width: int, height: int) -> list[tuple[int, int]]:
+    """Columns and rows (from the top) of local `positions` that are in the picture."""
+    clip = np.append(positions.astype(float), np.ones((len(positions), 1)), axis=1) @ view.clip_from_local.T
+    clip = clip[clip[:, 3] > 0.0]
+    places = clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5
+    inside = ((places >= 0.0) & (places < 1.0)).all(axis=1)
+    return [(int(x * width), int(y * height)) for x, y in places[inside]]
