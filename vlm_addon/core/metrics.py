@@ -70,7 +70,7 @@ def similarity(image: npt.NDArray[np.uint8], reference: npt.NDArray[np.uint8]) -
     for picture in (image, reference):
         if picture.dtype != np.uint8:
             raise InvalidInput("pictures to compare", f"values of type {picture.dtype}", "give 8 bits as displayed")
-    x, r = _selected(image, reference, None)
+    x, r = _selected(image.astype(np.float64), reference.astype(np.float64), None)
     return float(np.mean((np.minimum(x, r) + 1.0) / (np.maximum(x, r) + 1.0)))
 
 
