@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Negative point lights on pixels whose surface turns its back to lights: what reaches the back would be stopped there,
-// and goes on from the pixel in the mean direction that it comes in (seed 001, 3.3). A work group makes one.
+// and goes on from the pixel in the mean direction that it comes in (seed 001, 3.3). A work group makes one, for the
+// pixel alone.
 #include "passes/gbuffer_samplers.glsl"
 #include "gpu_layout/VirtualPointLight"
 #include "lib/vpl.glsl"
@@ -15,7 +16,6 @@ layout(std430, binding = PIXEL_BINDING) readonly buffer Pixels { ivec2 pixels[];
 layout(std430, binding = NEGATIVE_BINDING) writeonly buffer Negatives { VirtualPointLight negatives[]; };
 
 uniform uint light_count;
-uniform float pixels_each;              // that a negative light stands for
 uniform float width_at_0, width_per_depth; // of a pixel, m: width_at_0 + width_per_depth x depth
 uniform vec3 camera_position;           // m, from the local origin
 uniform vec3 camera_backward;           // unit
@@ -62,7 +62,7 @@ void main() {
         VirtualPointLight negative;
         negative.position = surface.position;
         negative.normal = squared > 0.0 ? mean * inversesqrt(squared) : vec3(0.0);
-        negative.area = shown ? pixel_area(surface) * pixels_each : 0.0;
+        negative.area = shown ? pixel_area(surface) : 0.0;
         negative.flux = squared > 0.0 ? group_flux[0] * negative.area : vec3(0.0);
         negatives[gl_WorkGroupID.x] = negative;
     }

@@ -218,7 +218,9 @@ def test_frame_is_the_same_bit_for_bit_whatever_came_before(device: Device) -> N
     second = rendered(device, room, 2)
     for name, image in first.images.items():
         assert (image == second.images[name]).all(), name
-    assert first.counters == second.counters
+    # Maps may be kept from what came before.
+    before, after = ({**frame.counters, "reflective_maps_drawn": 0} for frame in (first, second))
+    assert before == after
     assert first.images["indirect"].max() > 0.0
 
 

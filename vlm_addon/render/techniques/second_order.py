@@ -32,8 +32,10 @@ NEGATIVE_GROUP_SIZE = 64
 PIXEL_BINDING, NEGATIVE_BINDING = 1, 2
 BOUND_RECEIVERS = 512
 """Surface points where it is measured what the bounded geometry term takes off."""
+LOOKED_AT = 4
+"""Pixels for each negative light: at most of them no light is stopped."""
 LEAST_FLUX = 1e-4
-"""Of a negative light that counts, of the strongest one."""
+"""Of a negative light that counts, for a pixel and of the strongest one: rounding makes some on even walls."""
 MARK_RADIUS = 1
 """Of a light's mark in its picture, pixels."""
 WHITE, BLUE = (1.0, 1.0, 1.0), (0.1, 0.3, 1.0)
@@ -53,7 +55,7 @@ class Placement:
         "count",
         0,
         4096,
-        "Places in the picture where lights may take away what a surface there stops; 0: nothing is occluded",
+        "Lights that take away what surfaces stop, on the dark sides of those in the picture; 0: nothing is occluded",
         source="001, 3.3, table 1",
     )
     resolution: int = setting(
@@ -79,24 +81,36 @@ class NegativeLightPass:
         self._shader = shaders.compute("techniques/second_order_negative.comp", defines)
 
     def render(self, gbuffer: GBuffer, view: View, lights: PointLights, count: int, picture: int) -> PointLights:
-        """`count` of them, those without flux where light stops nowhere. picture: each takes other pixels."""
+        """The first `count` on pixels where light is stopped; fewer where that is rare. picture: each takes others.
+
+        Waits for the device.
+        """
         width, height = gbuffer.size
-        places = halton_points(count, first=1 + picture * count)
+        tried = LOOKED_AT * count
+        places = halton_points(tried, first=1 + picture * tried)
         pixels = (places * (width, height)).astype(np.int32)
         pixel_buffer = self._context.buffer(pixels.tobytes())
-        found = PointLights(self._context.buffer(reserve=VIRTUAL_POINT_LIGHT.dtype.itemsize * count), count)
+        found = PointLights(self._context.buffer(reserve=VIRTUAL_POINT_LIGHT.dtype.itemsize * tried), tried)
         gbuffer.bind()
         lights.buffer.bind_to_storage_buffer(LIGHT_BINDING)
         pixel_buffer.bind_to_storage_buffer(PIXEL_BINDING)
         found.buffer.bind_to_storage_buffer(NEGATIVE_BINDING)
         at_0, per_depth = (across / width for across in view.picture_width(width))
-        uniforms = {"light_count": lights.count, "pixels_each": width * height / count}
-        uniforms |= {"width_at_0": at_0, "width_per_depth": per_depth, "is_orthographic": view.is_orthographic}
+        uniforms = {"light_count": lights.count, "is_orthographic": view.is_orthographic}
+        uniforms |= {"width_at_0": at_0, "width_per_depth": per_depth}
         uniforms |= {"camera_position": view.position.tolist(), "camera_backward": view.backward.tolist()}
         set_uniforms(self._shader, uniforms)
-        self._shader.run(count)
+        self._shader.run(tried)
         self._context.memory_barrier()
-        return found
+        records = found.records().copy()
+        flux = records["flux"].max(axis=1)
+        kept = np.flatnonzero(flux > LEAST_FLUX * flux.max())[:count]
+        # The first `count` stand for the pixels up to the last of them, all for the whole picture.
+        reached = int(kept[-1]) + 1 if len(kept) == count else tried
+        records = records[kept]
+        for name in ("flux", "area"):
+            records[name] *= width * height / reached
+        return uploaded(self._context, records)
 
 
 class SecondOrder(Technique):
@@ -180,10 +194,10 @@ class SecondOrder(Technique):
         """Of the last picture: lights; negative lights that take something away and how much, W, mean of the channels;
         shares of the light that they and the bounded term take off. Of the frame: share of pixels for which the low
         resolution did, maps, maps that were drawn."""
-        negative = _strong(self._negative)
+        negative = self._negative.records()
         return {
             "indirect_lights": self._lights.count,
-            "negative_lights": len(negative),
+            "negative_lights": self._negative.count,
             "negative_flux": float(negative["flux"].mean(axis=1).sum()) * self.scene.space.unit**2,
             "negative_removes_share": self._negative_share(),
             "bound_removes_share": self._removed or 0.0,
@@ -215,18 +229,11 @@ class SecondOrder(Technique):
     def _marked(self, frame: FrameInputs) -> Float32:
         """Base colour with a mark for each light, over everything that may hide it."""
         image = DIMMED * read_image(frame.gbuffer.base_color)[..., :3]
-        for records, colour in ((self._lights.records(), WHITE), (_strong(self._negative), BLUE)):
+        for records, colour in ((self._lights.records(), WHITE), (self._negative.records(), BLUE)):
             for column, row in _pixels_of(records["position"], frame.view, image.shape[1], image.shape[0]):
                 rows, columns = (slice(max(at - MARK_RADIUS, 0), at + MARK_RADIUS + 1) for at in (row, column))
                 image[rows, columns] = colour
         return image
-
-
-def _strong(lights: PointLights) -> np.ndarray:
-    """Records of those that take something away that could be seen."""
-    records = lights.records()
-    flux = records["flux"].max(axis=1, initial=0.0)
-    return records[flux > LEAST_FLUX * flux.max(initial=0.0)]
 
 
 def _pixels_of(positions: Float32, view: View, width: int, height: int) -> list[tuple[int, int]]:
