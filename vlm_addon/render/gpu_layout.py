@@ -15,6 +15,7 @@ import numpy as np
 from ..core.brdf import MAX_F0
 from ..core.lamps import NARROW_CONE
 from ..core.light_clusters import FADE, SOFTNESS
+from ..core.octree_march import FAR_OUTSIDE, SLACK
 from ..core.stacked_hemispheres import LEAST_COSINE
 
 # GLSL type: (numpy scalar, components, alignment in bytes)
@@ -314,5 +315,7 @@ CONSTANTS: dict[str, int | float] = {
     "CLUSTER_FADE": FADE,
     "CLUSTER_SOFTNESS": SOFTNESS,
     "LEAST_COSINE": LEAST_COSINE,
+    "OCTREE_FAR": FAR_OUTSIDE,
+    "OCTREE_SLACK": SLACK,
 }
 """Numbers that Python and GLSL share; every shader sees them as `#define`s."""
