@@ -19,6 +19,7 @@ from tests.render.gathering import COLUMNS, gathered
 from tests.render.rooms import box_room, camera_at
 from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.lamps import lamp_irradiance
+from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
@@ -249,3 +250,47 @@ def test_sun_bounces_off_the_floor_onto_a_wall(device: Device) -> None:
     squared = (towards**2).sum(axis=1)
     factor = (-towards[:, 0] * -(towards * facing[lit]).sum(axis=1) / (np.pi * squared**2) * areas[lit]).sum()
     np.testing.assert_allclose(found, 0.6 * 2.0 * factor, rtol=0.03)
+
+
+def test_images_show_every_step(device: Device) -> None:
+    """Of a frame with a cube's map and a tile's: places in the room, all of the flux, and where the pixel looked."""
+    room = replace(empty_room([MIDDLE, LAMPS["spot"]]), name="moved")
+    offset = np.array([7.0, -3.0, 2.0])
+    moved = replace(
+        room,
+        meshes=tuple(replace(mesh, positions=mesh.positions + offset) for mesh in room.meshes),
+        lights=tuple(
+            replace(lamp, position=tuple((np.array(lamp.position) + offset).tolist())) for lamp in room.lights
+        ),
+        camera=camera_at(np.array((-1.8, -1.0, 0.55)) + offset, np.array((0.55, 0.45, -0.18)) + offset, lens=17.0),
+    )
+    frame = rendered(device, moved, low_resolution=1)
+    images = {name.removeprefix("rsm_gather_"): image for name, image in frame.images.items() if "rsm_gather_" in name}
+    assert images["map_0_position"].shape == (512, 768, 3)
+    assert images["map_1_flux"].shape == (512, 512, 3)
+    for index, lamp in enumerate(room.lights):
+        shown = (images[f"map_{index}_normal"] != 0.0).any(axis=2)
+        places = images[f"map_{index}_position"][shown] - offset
+        on_wall = np.abs(np.abs(places) - 0.5 * np.array(ROOM_SIZE)).min(axis=1)
+        assert on_wall.max() < 1e-4
+        found = images[f"map_{index}_flux"].sum(axis=(0, 1), dtype=float)
+        np.testing.assert_allclose(found, reflected_power(lamp), rtol=0.01)
+        looked = images[f"map_{index}_places"]
+        assert set(np.unique(looked)) == {0.0, 1.0}
+        assert 50 < looked.sum() <= 200
+    share = images["bound_removes"].sum() / (images["bound_removes"].sum() + frame.images["irradiance"].mean(2).sum())
+    assert share == pytest.approx(frame.counters["bound_removes_share"], rel=1e-3)
+    assert images["discontinuity"].all()
+
+
+def test_low_resolution_differs_little_and_its_images_show_where(device: Device) -> None:
+    room = empty_room([MIDDLE])
+    wanted = RenderSettings(96, 72, "rsm_gather", {"samples": 1000}, 1, 64, 4, buffers=True)
+    frame = device.render(room, None, wanted)
+    every = device.render(room, None, replace(wanted, technique_settings={"samples": 1000, "low_resolution": 1}))
+    assert relative_rmse(frame.images["indirect"], every.images["indirect"]) < 0.02
+    share = frame.counters["low_resolution_share"]
+    assert share > 0.5
+    assert frame.images["rsm_gather_discontinuity"].mean() == pytest.approx(1.0 - share, abs=0.02)
+    low = frame.images["rsm_gather_low_resolution"]
+    assert np.abs(low - every.images["irradiance"]).mean() < 0.1 * low.mean()
