@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.array_codec import content_hash
+from ..core.errors import DeviceError
 from ..core.scene import Float32, Float64, Int32, Mesh
 
 if TYPE_CHECKING:
     import moderngl
+
+
+BYTES_PER_CORNER = 48
+"""Of what a corner receives: three vec4."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,11 @@ class GpuCorners:
 
     def __init__(self, context: moderngl.Context, corners: Corners, meshes: Sequence[Mesh], origin: Float64) -> None:
         self.count = len(corners.vertices)
+        limit = int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
+        if max(BYTES_PER_CORNER * self.count, corners.faces.nbytes) > limit:
+            raise DeviceError(
+                f"{self.count:,} corners do not fit the device's blocks of {limit:,} bytes; compute light at pixels"
+            )
         positions = [mesh.positions for mesh in meshes if len(mesh.triangles)]
         points = np.zeros((max(self.count, 1), 8), np.float32)
         if self.count:

@@ -17,7 +17,7 @@ from ..gpu_layout import CONSTANTS
 from ..local_space import LocalSpace
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..view import View
-from ..wave_corners import GpuCorners
+from ..wave_corners import BYTES_PER_CORNER, GpuCorners
 from .gbuffer import GBuffer
 from .phase_two import IrradianceImage, entry_runs
 
@@ -28,8 +28,6 @@ GROUP_SIZE = 64
 GROUP_SIDE = 8
 POINT_BINDING, LIGHT_BINDING, FACE_BINDING = 2, 3, 5
 RESULT_BINDING = int(CONSTANTS["RESULT_BINDING"])
-SUMS_PER_CORNER = 3
-BYTES_PER_VEC4 = 16
 WAVE_DEFINES = {
     "GROUP_SIDE": GROUP_SIDE,
     "GROUP_SIZE": GROUP_SIZE,
@@ -74,7 +72,7 @@ class WaveLightPass:
     ) -> moderngl.Buffer:
         """Three vec4 for each corner: irradiance on its normal's side and on the other one, W/m², and radiance of the
         specular layer towards the eye. `progress` hears of each dispatch and may cancel."""
-        sums = self._context.buffer(reserve=SUMS_PER_CORNER * BYTES_PER_VEC4 * max(corners.count, 1))
+        sums = self._context.buffer(reserve=BYTES_PER_CORNER * max(corners.count, 1))
         sums.clear()
         geometry.bind()
         corners.points.bind_to_storage_buffer(POINT_BINDING)

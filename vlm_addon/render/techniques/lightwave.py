@@ -8,19 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.light_wave import (
-    SPREAD_LIGHTS,
-    Wave,
-    WaveSettings,
-    sampled_frames,
-    sampled_lights,
-    spread_frames,
-    spread_lights,
-)
+from ...core.light_wave import Wave, WaveSettings
+from ...core.progress import Progress
 from ...core.scene import DIFFUSE, Float32
 from ...core.settings import setting
-from ...core.stacked_hemispheres import integrated_shadow_count, shadow_map_bytes
-from ..local_space import LocalSpace
+from ...core.stacked_hemispheres import shadow_map_bytes
 from ..passes.accumulate import read_image
 from ..passes.phase_two import IrradianceImage
 from ..passes.wave_light import (
@@ -32,22 +24,21 @@ from ..passes.wave_light import (
     WaveLightPass,
     upload_wave,
 )
-from ..passes.wave_shadow import WaveMapPass, WaveMaps, WaveShadowPass
-from ..point_picture import drawn_points
+from ..point_picture import palette, with_points
 from ..shader_library import set_uniforms
 from ..technique import FrameInputs, SceneInputs, Technique
 from ..view import View, make_view
 from ..wave_corners import GpuCorners, corners_key, find_corners
-from ..wave_store import WaveStore, occluders_key
+from ..wave_shadows import ACCURATE, INTEGRATED, NONE, WaveShadows, WaveShadowSettings
+from ..wave_store import WaveStore
 
 if TYPE_CHECKING:
     import moderngl
 
 CORNERS, PIXELS = "corners", "pixels"
-ACCURATE, INTEGRATED, NONE = "accurate", "integrated", "none"
-MOST_MAP_BYTES = 1 << 30
-"""Of all shadow maps together; beyond, they get smaller."""
 VISIBILITY_UNIT = 10
+DIMMED = 0.3
+"""Of the base colour under the picture of the lights."""
 WITH_ACCURATE, WITH_INTEGRATED = ("shadows", ACCURATE), ("shadows", INTEGRATED)
 
 
@@ -146,14 +137,14 @@ class LightWave(Technique):
         self._waves = self._found_waves()
         self._sum = WaveLightPass(context, shaders, self._has_specular)
         self._gpu_waves = [upload_wave(context, wave, scene.space, settings.strength) for wave in self._waves]
-        self._map_scale = self._allowed_scale()
-        self._maps = self._found_maps()
+        shadows = WaveShadowSettings(settings.shadows, settings.maps, settings.steps, settings.map_scale)
+        self._shadows = WaveShadows(scene, self._store, self._waves, shadows)
         self._store.end()
-        self._shadow = WaveShadowPass(context, shaders, *size)
         self._images = {name: IrradianceImage(context, *size) for name in ("light", "specular", "unshadowed")}
         self._wave_images = [IrradianceImage(context, *size) for _ in range(2)]
         defines = {**WAVE_DEFINES, "VISIBILITY_UNIT": VISIBILITY_UNIT, "AT_CORNERS": settings.computed_at == CORNERS}
         self._combine = shaders.compute("techniques/lightwave.comp", defines)
+        self._frame: FrameInputs | None = None
         self._corner_sums: list[moderngl.Buffer] = []
         if settings.computed_at == CORNERS:
             self._sum_at_corners()
@@ -168,37 +159,6 @@ class LightWave(Technique):
         lamps = [light for light in world.lights if not light.from_world]
         return [wave for light in lamps for wave in self._store.waves(light, low, high, shape)]
 
-    def _allowed_scale(self) -> float:
-        """The map scale that memory and the device allow."""
-        settings, chosen = self.scene.settings, self.chosen
-        largest = int(self.scene.context.info["GL_MAX_TEXTURE_SIZE"]) / max(settings.width, settings.height)
-        needed = shadow_map_bytes(settings.width, settings.height, 1.0, max(self._map_count(), 1))
-        return float(min(chosen.map_scale, largest, (MOST_MAP_BYTES / needed) ** 0.5))
-
-    def _map_count(self) -> int:
-        """Of all waves."""
-        per_wave = {ACCURATE: self.chosen.maps, INTEGRATED: SPREAD_LIGHTS, NONE: 0}[self.chosen.shadows]
-        return per_wave * len(self._waves)
-
-    def _found_maps(self) -> list[WaveMaps]:
-        scene, chosen = self.scene, self.chosen
-        if chosen.shadows == NONE or not self._waves:
-            return []
-        size = tuple(max(1, round(self._map_scale * side)) for side in (scene.settings.width, scene.settings.height))
-        self._map_pass = WaveMapPass(scene.context, scene.shaders, (size[0], size[1]))
-        occluders = occluders_key(scene.world)
-        maps = []
-        with scene.timer.measure("indirect shadow maps"):
-            for wave in self._waves:
-                if chosen.shadows == ACCURATE:
-                    lights = sampled_lights(wave, chosen.maps)
-                    places = wave.positions[lights], sampled_frames(wave, lights)
-                else:
-                    lights = spread_lights(wave)
-                    places = wave.positions[lights], spread_frames(wave, lights)
-                maps.append(self._store.maps(self._map_pass, scene.geometry, scene.space, places, occluders, size))
-        return maps
-
     def _sum_at_corners(self) -> None:
         scene = self.scene
         meshes = scene.snapshot.meshes
@@ -207,9 +167,14 @@ class LightWave(Technique):
         view = self._centred_view()
         with scene.timer.measure("wave of light"):
             self._corner_sums = [
-                self._sum.at_corners(scene.geometry, self._corners, wave, view, scene.progress)
-                for wave in self._gpu_waves
+                self._sum.at_corners(scene.geometry, self._corners, wave, view, self._part(scene.progress, index))
+                for index, wave in enumerate(self._gpu_waves)
             ]
+
+    def _part(self, progress: Progress, index: int) -> Progress:
+        """Progress of one wave's part of the work."""
+        count = len(self._gpu_waves)
+        return lambda fraction, label: progress((index + fraction) / count, label)
 
     def _centred_view(self) -> View:
         camera, settings = self.scene.snapshot.camera, self.scene.settings
@@ -218,33 +183,20 @@ class LightWave(Technique):
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the waves of their light times the share that their maps see (eq. 4.9)."""
+        self._frame = frame
         for image in self._images.values():
             image.clear()
-        records = self._records()
         for index, wave in enumerate(self._gpu_waves):
             if self.chosen.computed_at == PIXELS:
                 with self.scene.timer.measure("wave of light"):
                     light, specular = self._wave_images
-                    self._sum.at_pixels(frame.gbuffer, wave, frame.view, light, specular, frame.progress)
-            visibility = None
-            if self._maps:
-                with self.scene.timer.measure("indirect shadows"):
-                    visibility = self._visibility(frame, self._maps[index], records[index])
+                    self._sum.at_pixels(
+                        frame.gbuffer, wave, frame.view, light, specular, self._part(frame.progress, index)
+                    )
+            visibility = self._shadows.visibility(frame.gbuffer, index)
             with self.scene.timer.measure("combine"):
                 self._add(frame, index, visibility)
         return self._images["light"].texture
-
-    def _records(self) -> list[list[np.ndarray]]:
-        space: LocalSpace = self.scene.space
-        return [
-            [self._map_pass.record(space, *place) for place in zip(maps.positions, maps.frames, strict=True)]
-            for maps in self._maps
-        ]
-
-    def _visibility(self, frame: FrameInputs, maps: WaveMaps, records: list[np.ndarray]) -> moderngl.Texture:
-        if self.chosen.shadows == ACCURATE:
-            return self._shadow.accurate(frame.gbuffer, maps, records)
-        return self._shadow.integrated(frame.gbuffer, maps, records, self.chosen.steps)
 
     def _add(self, frame: FrameInputs, index: int, visibility: moderngl.Texture | None) -> None:
         frame.gbuffer.bind()
@@ -271,20 +223,17 @@ class LightWave(Technique):
     def counters(self) -> dict[str, float]:
         """Lights, shadow maps and shadows of all lamps; what was computed anew in this frame; bytes of the maps, and
         what the seed's figure for them and the direct light's map would be (eq. 5.4)."""
-        settings, chosen = self.scene.settings, self.chosen
-        maps = self._map_count()
-        shadows = maps
-        if chosen.shadows == INTEGRATED:
-            shadows = integrated_shadow_count(SPREAD_LIGHTS, chosen.steps) * len(self._waves)
+        settings, shadows = self.scene.settings, self._shadows
+        maps = shadows.map_count
         return {
             "virtual_point_lights": sum(len(wave) for wave in self._waves),
             "waves": len(self._waves),
             "waves_computed": self._store.computed,
             "indirect_shadow_maps": maps,
             "indirect_shadow_maps_drawn": self._store.drawn,
-            "indirect_shadows": shadows,
-            "indirect_shadow_map_bytes": shadow_map_bytes(settings.width, settings.height, self._map_scale, maps),
-            "published_map_bytes": shadow_map_bytes(settings.width, settings.height, chosen.map_scale, maps + 1),
+            "indirect_shadows": shadows.shadow_count,
+            "indirect_shadow_map_bytes": shadows.nbytes(),
+            "published_map_bytes": shadow_map_bytes(settings.width, settings.height, self.chosen.map_scale, maps + 1),
         }
 
     def images(self) -> dict[str, Float32]:
@@ -294,17 +243,17 @@ class LightWave(Technique):
         found = {"lightwave_unshadowed": unshadowed, "lightwave_indirect_shadow": share}
         if self._has_specular:
             found["lightwave_specular"] = read_image(self._images["specular"].texture)[..., :3]
-        size = (self.scene.settings.width, self.scene.settings.height)
-        places = [self.scene.space.local_points(wave.positions) for wave in self._waves] or [np.zeros((0, 3))]
-        shells = [np.asarray(wave.shells) for wave in self._waves] or [np.zeros(0, int)]
-        found["lightwave_lights"] = drawn_points(
-            self._centred_view(), np.concatenate(places), np.concatenate(shells), size
-        )
+        if self._frame is not None:
+            found["lightwave_lights"] = self._drawn_lights(self._frame)
         return found
+
+    def _drawn_lights(self, frame: FrameInputs) -> Float32:
+        """The base colour, dimmed, and over it the lights, a colour for each shell."""
+        image = DIMMED * read_image(frame.gbuffer.base_color)[..., :3]
+        for wave in self._waves:
+            image = with_points(image, frame.view, self.scene.space.local_points(wave.positions), palette(wave.shells))
+        return image
 
     def reasons(self) -> list[str]:
         """Why maps are smaller than asked for."""
-        if self._map_scale >= self.chosen.map_scale or not self._maps:
-            return []
-        limit = f"the device's limits or {MOST_MAP_BYTES >> 20} MiB for {self._map_count()} maps"
-        return [f"indirect shadow maps are {self._map_scale:.2f} times the picture's size, to keep {limit}"]
+        return self._shadows.reasons()
