@@ -63,7 +63,7 @@ void main() {
     vec3 to_camera = is_orthographic ? camera_backward : normalize(camera_position - p);
 #if AT_CORNERS
     vec3 seen_normal = dot(n, to_camera) < 0.0 ? -n : n;
-    Surface surface = corner_surface(materials[floatBitsToInt(points[2 * index].w)], p, seen_normal);
+    Surface surface = corner_surface(materials[int(points[2 * index].w)], p, seen_normal);
 #else
     vec3 seen_normal = n;
     Surface surface = fetch_surface(pixel);

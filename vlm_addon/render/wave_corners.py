@@ -74,7 +74,7 @@ class GpuCorners:
         points = np.zeros((max(self.count, 1), 8), np.float32)
         if self.count:
             points[:, :3] = np.concatenate(positions)[corners.vertices] - origin
-            points[:, 3] = corners.materials.view(np.float32)
+            points[:, 3] = corners.materials
             points[:, 4:7] = corners.normals
         self.points = context.buffer(points.tobytes())
         self.faces = context.buffer(corners.faces.tobytes() or bytes(16))

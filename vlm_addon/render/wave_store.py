@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Waves and their shadow maps, kept over frames: a wave until its lamp moves, its maps until something casts anew."""
+"""Waves and their shadow maps, kept over frames: a wave until its lamp or the bounds of the scene change, its maps
+until something that casts shadows does."""
 
 from __future__ import annotations
 
