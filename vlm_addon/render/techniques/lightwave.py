@@ -6,11 +6,11 @@ the receiver, the specular term without attenuation and the division by the coun
 of shadow maps that see (eq. 4.9), maps of lights picked by chance, and pairs of five maps with steps between (eq. 4.8).
 
 Made to fit what is measured in W/m²: the seed's lamp is as bright everywhere, ours is so at its mean distance to the
-end of the scene, and each ray carries what the lamp sends that way, with its colour; its highlight is Phong's, ours that
-of the surface's own layer, blurred by what a ray stands for. Where the seed leaves it open: maps of single lights look
-along their normals over 120 degrees or more, those integrated between all look along the lamp's axis, and only lights
-inside the scene's bounds have maps, since outer walls hide all from the others. Not taken over: lights packed into the
-range of 0 to 1 (eq. 4.3 and 4.4), which textures of floats do not need.
+end of the scene, and each ray carries what the lamp sends that way, with its colour; its highlight is Phong's, ours
+that of the surface's own layer, blurred by what a ray stands for. Where the seed leaves it open: maps of single lights
+look along their normals over 120 degrees or more, those integrated between all look along the lamp's axis, and only
+lights inside the scene's bounds have maps, since outer walls hide all from the others. Not taken over: lights packed
+into the range of 0 to 1 (eq. 4.3 and 4.4), which textures of floats do not need.
 """
 
 from __future__ import annotations
