@@ -15,6 +15,7 @@ from tests.render.rooms import camera_at, quad
 from vlm_addon.core.brdf import diffuse_reflectance
 from vlm_addon.core.lamps import lamp_irradiance, spot_attenuation
 from vlm_addon.core.scene import AREA, DIFFUSE, POINT, PRINCIPLED, SPOT, SUN, Float64, Light, Material, SceneSnapshot
+from vlm_addon.core.world_light import merged_world_lights, world_lights
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.kept import Kept
@@ -325,3 +326,13 @@ def test_camera_and_lamp_agree_on_which_side_is_the_back(device: Device) -> None
     snapshot = SceneSnapshot("s", (floor,), (Material("m"),), lights=(below,), camera=camera_at((0, 0, 1), (0, 0, 0)))
     assert not total_flux(device, snapshot).any()
     assert total_flux(device, replace(snapshot, lights=(replace(below, position=(0.0, 0.0, 1.0)),))).all()
+
+
+@pytest.mark.parametrize(("count", "bound"), [(64, 0.02), (16, 0.05), (4, 0.2)])
+def test_flux_of_an_even_world_is_that_of_its_irradiance(device: Device, count: int, bound: float) -> None:
+    """An open floor receives pi times the radiance, less what comes over the horizon from suns that are below it."""
+    suns = world_lights((0.5, 1.0, 2.0), None, 64)
+    floor = quad((-2.0, -1.0, 0.0), (4.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    snapshot = SceneSnapshot("s", (floor,), (Material("m", DIFFUSE, GREY[0]),), lights=merged_world_lights(suns, count))
+    expected = np.array(GREY[0]) * np.pi * (0.5, 1.0, 2.0) * 8.0
+    np.testing.assert_allclose(total_flux(device, snapshot, resolution=32), expected, rtol=bound)

@@ -76,13 +76,14 @@ class Marks:
 
 
 class RsmGatherPass:
-    """Irradiance of every pixel from reflective shadow maps."""
+    """Irradiance of every pixel from reflective shadow maps. brightest: W/m², what no sum of the latest exceeds."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
         self._context = context
         self._library = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
+        self.brightest = (0.0, 0.0, 0.0)
 
     def render(
         self,
@@ -135,6 +136,8 @@ class RsmGatherPass:
                 shader.run(-(-width // GROUP_SIDE), -(-height // GROUP_SIDE))
                 self._context.memory_barrier()
                 step(progress, (index + end / len(taps)) / count, "gather")
+        red, green, blue = brightest.tolist()
+        self.brightest = red, green, blue
         return self._irradiance.texture
 
     def _shader(self, is_cube: bool, has_history: bool, marks_places: bool) -> moderngl.ComputeShader:

@@ -12,6 +12,7 @@ import numpy as np
 from ...core.array_codec import content_hash
 from ...core.scene import Float32
 from ...core.settings import setting
+from ...core.world_light import merged_world_lights
 from ..passes.accumulate import read_image
 from ..passes.low_resolution import LowResolutionGather, LowResolutionSettings, PickedPixels, SizedPasses
 from ..passes.rsm import LampReflections, ReflectiveShadowMap
@@ -59,6 +60,13 @@ class Settings(LowResolutionSettings):
     )
     area_maps: int = setting(
         4, "count", 1, 64, "Points of an area lamp that have a map each; one in its middle is off near the lamp"
+    )
+    world_maps: int = setting(
+        16,
+        "count",
+        1,
+        1024,
+        "Directions that the world's light is joined to, with a map each; few lose light that comes from the horizon",
     )
     pattern: str = setting(
         STATIC,
@@ -121,8 +129,9 @@ class RsmGather(Technique):
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         width, height = scene.settings.width, scene.settings.height
+        lit = replace(scene.world, lights=merged_world_lights(scene.world.lights, settings.world_maps))
         self._maps = LampReflections(
-            scene.context, scene.shaders, scene.kept, scene.world, settings.resolution, settings.area_maps
+            scene.context, scene.shaders, scene.kept, lit, settings.resolution, settings.area_maps
         )
         self._low = LowResolutionGather(
             scene.context, scene.shaders, width, height, settings, keep_low=scene.settings.buffers
@@ -131,8 +140,9 @@ class RsmGather(Technique):
         self._temporal: TemporalPass | None = None
         if settings.pattern == ROTATING:
             self._temporal = TemporalPass(scene.context, scene.shaders, scene.kept, self.name, width, height)
-        self._lights_key = content_hash([[replace(light, name="") for light in scene.world.lights], settings])
+        self._lights_key = content_hash([[replace(light, name="") for light in lit.lights], settings])
         self._irradiance: moderngl.Texture | None = None
+        self._brightest = (0.0, 0.0, 0.0)
         self._marks: Marks | None = None
         with scene.timer.measure("reflective shadow maps"):
             self._maps.draw()
@@ -165,19 +175,15 @@ class RsmGather(Technique):
             taps, first_age = taps[part.first : part.end], 1
             part = replace(part, first=0, end=len(taps))
         found = self._gathered(frame, Sampling(taps, parts // first_age, chosen.radius, part))
-        return temporal.finish(frame.gbuffer, found, first_age, max(chosen.history, first_age), self._brightest())
+        return temporal.finish(frame.gbuffer, found, first_age, max(chosen.history, first_age), self._brightest)
 
     def _gathered(self, frame: FrameInputs, sampling: Sampling) -> moderngl.Texture:
         def gather(picked: PickedPixels) -> moderngl.Texture:
-            return self._passes.of(picked.gbuffer).render(
-                picked,
-                self.scene.space,
-                self._maps.maps(),
-                len(self._maps),
-                sampling,
-                frame.progress,
-                self._marks,
-            )
+            gather_pass = self._passes.of(picked.gbuffer)
+            maps, count = self._maps.maps(), len(self._maps)
+            found = gather_pass.render(picked, self.scene.space, maps, count, sampling, frame.progress, self._marks)
+            self._brightest = gather_pass.brightest
+            return found
 
         return self._low.render(frame.gbuffer, frame.view, gather)
 
@@ -185,11 +191,6 @@ class RsmGather(Technique):
         """How far aside a pixel may lie that takes over what is found for one."""
         factor: int = self.chosen.low_resolution
         return factor - 1 + factor // 2
-
-    def _brightest(self) -> tuple[float, float, float]:
-        """W/m²: what no irradiance exceeds."""
-        red, green, blue = np.sum([found.brightest for found in self._maps.maps()] + [np.zeros(3)], axis=0).tolist()
-        return red, green, blue
 
     def counters(self) -> dict[str, float]:
         """Maps and how many were drawn in this frame; share of the unbounded irradiance that bounds took off in the
