@@ -6,8 +6,8 @@ follow from the way down, children that are empty need no place, and visibility 
 word: its lower 8 bits say which of the octants have children, the upper 24 where the first of those stands; the others
 follow it. The lowest two levels are one 64-bit mask, a brick of 4 x 4 x 4 voxels: a voxel costs some bits, not 16
 bytes. Levels follow each other from the root down, each in the order of the Z-order curve, so the same voxels are the
-same tree, bit for bit. Octant x + 2 y + 4 z; the place of a voxel in its brick is 8 times the octant of 2 x 2 x 2 voxels
-plus the voxel in it.
+same tree, bit for bit. Octant x + 2 y + 4 z; a voxel's place in its brick is 8 times the octant of 2 x 2 x 2 voxels plus
+the voxel in it.
 """
 
 from __future__ import annotations
@@ -148,6 +148,10 @@ def tree_of_codes(codes: Int64, depth: int) -> VoxelOctree:
 
     Raises InvalidInput where a level has more nodes than a word can name.
     """
+    if not len(codes):
+        starts = np.ones(depth - BRICK_LEVELS + 1, np.int64)
+        starts[0] = 0
+        return VoxelOctree(depth, np.zeros(1, np.uint32), starts, np.zeros(0, np.uint64))
     bricks = _parents_masks(codes, 3 * BRICK_LEVELS)
     masks, counts = bricks[1], [len(bricks[0])]
     level_codes = bricks[0]
@@ -157,8 +161,6 @@ def tree_of_codes(codes: Int64, depth: int) -> VoxelOctree:
         words.insert(0, (octants, firsts))
         counts.insert(0, len(parents))
         level_codes = parents
-    if not len(codes):
-        words[0], counts[0] = (np.zeros(1, np.uint64), np.zeros(1, np.int64)), 1
     if max(counts) > MOST_NODES:
         raise InvalidInput("voxel octree", f"{max(counts):,} nodes on one level", "use a lower resolution")
     starts = np.cumsum([0, *counts[:-1]])
@@ -175,8 +177,7 @@ def _parents_masks(codes: Int64, bits: int) -> tuple[Int64, UInt64, Int64]:
     """Codes without their lower `bits`, each once; which of those lower bits occur, as a mask; where each begins."""
     parents, firsts = np.unique(codes >> bits, return_index=True)
     flags = np.uint64(1) << (codes & ((1 << bits) - 1)).astype(np.uint64)
-    masks = np.bitwise_or.reduceat(flags, firsts) if len(firsts) else np.zeros(0, np.uint64)
-    return parents, masks, firsts
+    return parents, np.bitwise_or.reduceat(flags, firsts), firsts
 
 
 def _expanded(codes: Int64, masks: npt.NDArray[np.uint8]) -> Int64:
