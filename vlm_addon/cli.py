@@ -103,6 +103,8 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     command.add_argument("--samples", type=int, default=16, metavar="N", help="jittered pictures averaged (16)")
     shadow_help = "points of each soft lamp, for its penumbra (32)"
     command.add_argument("--shadow-samples", type=int, default=32, metavar="N", help=shadow_help)
+    world_help = "directions that stand for the world's light, each with a shadow map; the scene's own setting without"
+    command.add_argument("--world-lights", type=int, metavar="N", help=world_help)
     command.add_argument("--view", metavar="NAME", help="view transform of a PNG; the scene's without")
     command.add_argument("--out", type=Path, required=True, metavar="IMG", help=".exr (linear Rec.709) or .png")
     command.add_argument("--buffers", type=Path, metavar="DIR", help="every intermediate image as EXR into a folder")

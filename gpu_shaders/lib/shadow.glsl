@@ -16,6 +16,10 @@
 // What float32 leaves between a plane and its own depths in the map.
 #define SHADOW_ON_PLANE 5e-3
 
+// Square of a cosine from which on light of the world is given no more slack: what grazes brings little, but from all
+// around it would add up behind walls.
+#define SHADOW_LEAST_OF_WORLD 1e-2
+
 struct ShadowPoint {
     vec3 position;  // along a face's two axes and away from the lamp; for SHADOW_PARALLEL up towards the sun
     vec3 normal;    // likewise
@@ -58,7 +62,8 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
         return 0.0;
     }
     // Depth grows with the tangent of the angle of incidence, its change with the square of one over the cosine.
-    float steepness = 1.0 / max(cos_lamp * cos_lamp, 1e-4);
+    float least = lamp.world_solid_angle > 0.0 ? SHADOW_LEAST_OF_WORLD : 1e-4;
+    float steepness = 1.0 / max(cos_lamp * cos_lamp, least);
     ShadowPoint receiver = shadow_point(lamp, p, n);
     if (!parallel && receiver.position.z <= 0.0) {
         return 0.0; // at the lamp, or behind a spot

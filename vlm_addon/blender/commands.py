@@ -140,6 +140,7 @@ def render_command(arguments: Namespace) -> None:
         technique_settings=settings,
         samples=arguments.samples,
         shadow_samples=arguments.shadow_samples,
+        world_lights=RenderSettings.world_lights if arguments.world_lights is None else arguments.world_lights,
         buffers=arguments.buffers is not None,
     )
     require_in_range(frame_settings)
@@ -149,6 +150,8 @@ def render_command(arguments: Namespace) -> None:
     kept = technique_settings(bpy.context.scene, technique.name)
     chosen: Any = from_mapping(technique.settings, kept | settings, f"technique {technique.name!r}")
     frame_settings = replace(frame_settings, technique_settings=asdict(chosen))
+    if arguments.world_lights is None:
+        frame_settings = replace(frame_settings, world_lights=bpy.context.scene.vlm.world_lights)
     require_camera(found.snapshot)
     require_surfaces(found.snapshot)
     require_lights(found.snapshot)

@@ -79,6 +79,7 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
             technique=technique,
             technique_settings=technique_settings(scene, technique),
             samples=scene.vlm.samples,
+            world_lights=scene.vlm.world_lights,
         )
         frame = KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
         if self._is_cancelled():  # too late for the renderer to notice

@@ -85,6 +85,7 @@ class VLM_PT_render(_SidebarPanel, bpy.types.Panel):  # noqa: N801
         _labelled(column, scene.vlm, "technique")
         _technique_settings(column, scene)
         column.prop(scene.vlm, "samples")
+        column.prop(scene.vlm, "world_lights")
         layout.operator("render.render", text="Render Image", icon="RENDER_STILL")
         _hint(layout, context, availability.rendering_problem())
 

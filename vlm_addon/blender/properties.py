@@ -11,7 +11,7 @@ import bpy
 
 from ..core.settings import SettingInfo, describe, from_mapping
 from ..core.simplify import SimplifySettings
-from ..render.frame_types import RenderSettings
+from ..render.frame_types import LIMITS, RenderSettings
 from ..render.technique import Technique, technique_by_name, technique_list
 
 S = TypeVar("S")
@@ -128,6 +128,14 @@ def _scene_group(groups: dict[str, type | None]) -> type:
             default=defaults["samples"],
             min=1,
             max=MOST_SAMPLES,
+        ),
+        "world_lights": bpy.props.IntProperty(
+            name="World Lights",
+            description="Directions that stand for the world's light, each with a shadow map (direct light has up to "
+            "four times as many): more give smoother shadows of the sky and take longer; none if the world is black",
+            default=defaults["world_lights"],
+            min=1,
+            max=LIMITS["world_lights"],
         ),
         "target_triangles": _property(target),
         "findings": bpy.props.CollectionProperty(type=VLM_PG_finding, name="Findings of the last check"),

@@ -61,10 +61,9 @@ class _Region:
 
 
 def is_lit_by_world(snapshot: SceneSnapshot) -> bool:
-    """Whether any light comes from the world."""
-    return max(snapshot.world_radiance) > 0.0 or (
-        snapshot.environment is not None and bool(snapshot.environment.radiance.any())
-    )
+    """Whether any light comes from the world; radiance that means nothing counts, for `world_lights` to refuse."""
+    has_map = snapshot.environment is not None and bool(snapshot.environment.radiance.any())
+    return has_map or any(value != 0.0 for value in snapshot.world_radiance)
 
 
 def world_lights(

@@ -12,7 +12,7 @@ from ..core.array_codec import content_hash
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.progress import Progress, step
-from ..core.scene import Camera, Finding, Float32, SceneSnapshot
+from ..core.scene import Camera, Finding, Float32, Light, SceneSnapshot
 from ..core.settings import from_mapping
 from ..core.world_light import is_lit_by_world, world_lights
 from .frame_types import Frame, RenderSettings, require_in_range
@@ -22,7 +22,7 @@ from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
 from .passes.shadow_map import LampShadows
-from .picture_shares import picture_shares
+from .picture_shares import direct_world_lights, picture_shares
 from .technique import FrameInputs, SceneInputs, technique_by_name
 from .view import make_view, require_usable
 
@@ -49,9 +49,10 @@ def render_frame(
     _require_renderable(snapshot, light_mesh, settings)
     context, shaders, timer = device.context, device.shaders, device.timer()
     lamps = len(snapshot.lights)
+    direct_world: tuple[Light, ...] = ()
     if is_lit_by_world(snapshot):
         with timer.measure("world lights"):
-            snapshot = _with_world_lights(device, snapshot, settings)
+            snapshot, direct_world = _with_world_lights(device, snapshot, settings)
     width, height = settings.width, settings.height
     # From here on nothing is in world space but what is read back.
     space = make_local_space(snapshot)
@@ -61,6 +62,8 @@ def render_frame(
     with timer.measure("geometry"):
         geometry = GpuGeometry(context, local, np.zeros(3))
     shadows = LampShadows(context, shaders, geometry, local.lights, settings.shadow_resolution)
+    # A sun is the same in every space.
+    direct_shadows = shadows.for_lights((*local.lights[:lamps], *direct_world))
     scene = SceneInputs(
         context,
         shaders,
@@ -81,7 +84,7 @@ def render_frame(
     direct_light = DirectLightPass(context, shaders, width, height)
     gbuffer_pass = GBufferPass(context, shaders, width, height)
     accumulate = AccumulatePass(context, shaders, width, height, snapshot.environment)
-    shares = picture_shares(local.lights, settings.samples)
+    shares = picture_shares(direct_shadows.lights, settings.samples)
 
     for sample, jitter in enumerate(jitter_offsets(settings.samples)):
         view = make_view(camera, width, height, geometry.origin, tuple(jitter))
@@ -89,7 +92,7 @@ def render_frame(
             gbuffer = gbuffer_pass.render(geometry, view, sample)
         with timer.measure("direct light"):
             direct = direct_light.render(
-                gbuffer, shadows, view, sample, settings.samples, settings.shadow_samples, shares[sample]
+                gbuffer, direct_shadows, view, sample, settings.samples, settings.shadow_samples, shares[sample]
             )
         share = (1.0 - PREPARED) / settings.samples
         sample_progress = _within(progress, PREPARED + sample * share, share)
@@ -113,6 +116,7 @@ def render_frame(
         "triangles": geometry.triangle_count,
         "lights": lamps,
         "world_lights": len(snapshot.lights) - lamps,
+        "world_lights_direct": len(direct_world),
         "samples": settings.samples,
         **technique.counters(),
     }
@@ -131,11 +135,19 @@ def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | 
         require_valid(light_mesh)
 
 
-def _with_world_lights(device: Device, snapshot: SceneSnapshot, settings: RenderSettings) -> SceneSnapshot:
-    """`snapshot` with the lights of its world after its lamps. Raises InvalidInput."""
-    world = (snapshot.world_radiance, snapshot.environment, settings.world_lights)
-    lights = device.kept.get("world_lights", content_hash(list(world)), lambda: world_lights(*world))
-    return replace(snapshot, lights=(*snapshot.lights, *lights))
+def _with_world_lights(
+    device: Device, snapshot: SceneSnapshot, settings: RenderSettings
+) -> tuple[SceneSnapshot, tuple[Light, ...]]:
+    """`snapshot` with the lights of its world after its lamps, and those for direct light. Raises InvalidInput."""
+    world, count = (snapshot.world_radiance, snapshot.environment), settings.world_lights
+    content = content_hash(list(world))
+
+    def kept_lights(kind: str, count: int) -> tuple[Light, ...]:
+        return device.kept.get(kind, f"{content} {count}", lambda: world_lights(*world, count))
+
+    lights = kept_lights("world_lights", count)
+    direct = kept_lights("direct_world_lights", direct_world_lights(count, settings.samples))
+    return replace(snapshot, lights=(*snapshot.lights, *lights)), direct
 
 
 def _localised(space: LocalSpace, snapshot: SceneSnapshot) -> tuple[SceneSnapshot, Camera]:

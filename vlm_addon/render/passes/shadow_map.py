@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,10 +33,11 @@ FRONT_FACE = 5
 CUBE_TILES = (int(CONSTANTS["SHADOW_CUBE_COLUMNS"]), int(CONSTANTS["SHADOW_CUBE_ROWS"]))
 # A map of one tile has this many times the cube's texels per side: about as many in all.
 SINGLE_TILE_FACTOR = 2
-# Maps of soft lamps and of wide parts of the world are this much coarser: many of them are averaged.
+# Maps of soft lamps are this much coarser: many of them are averaged, and drawn for every picture.
 SOFT_DIVISOR = 2
+WORLD_DIVISOR = 4
+"""Likewise maps of the world's light from more than SHARP_ANGLE: its lights' number makes the error, not texels."""
 SHARP_ANGLE = math.radians(4.0)
-"""Light from the world that comes from less than this is a sun by itself."""
 LEAST_RESOLUTION = 16
 # Texels around what must be seen, for the filter.
 MARGIN = 2.0
@@ -98,8 +100,10 @@ class ShadowMapPass:
 
     def _face(self, light: Light) -> int:
         """Texels along a cube's face."""
-        is_blurred = is_soft(light) or (light.from_world and light.angle > SHARP_ANGLE)
-        return max(self._resolution // (SOFT_DIVISOR if is_blurred else 1), LEAST_RESOLUTION)
+        divisor = SOFT_DIVISOR if is_soft(light) else 1
+        if light.from_world and light.angle > SHARP_ANGLE:
+            divisor = WORLD_DIVISOR
+        return max(self._resolution // divisor, LEAST_RESOLUTION)
 
     def render(
         self,
@@ -266,6 +270,15 @@ def _parallel(record: np.ndarray, origin: Float64, centre: Float64, half: Float6
     return matrix
 
 
+class _KeptMaps:
+    """Maps that never change, and textures for those that do, by size."""
+
+    def __init__(self) -> None:
+        self.kept: dict[tuple[Light, ShadowWindow | None], ShadowMap] = {}
+        self.kept_bytes = 0
+        self.shared: dict[tuple[int, int], moderngl.Texture] = {}
+
+
 class LampShadows:
     """The maps of a scene's lamps over the samples of a frame: those that never change are drawn once."""
 
@@ -280,9 +293,13 @@ class LampShadows:
         self.lights = tuple(lights)
         self._geometry = geometry
         self._pass = ShadowMapPass(context, shaders, resolution)
-        self._kept: dict[tuple[int, ShadowWindow | None], ShadowMap] = {}
-        self._kept_bytes = 0
-        self._shared: dict[tuple[int, int], moderngl.Texture] = {}
+        self._maps = _KeptMaps()
+
+    def for_lights(self, lights: Sequence[Light]) -> LampShadows:
+        """The same for other lights; what both have is drawn once for both."""
+        other = copy.copy(self)
+        other.lights = tuple(lights)
+        return other
 
     @property
     def bounds(self) -> tuple[Float64, Float64]:
@@ -310,19 +327,19 @@ class LampShadows:
 
         together: how many consecutive samples are used in one picture. window: as in ShadowMapPass.render.
         """
-        key = (lamp_index, window)
-        if key in self._kept:
-            return self._kept[key]
-        light = self.lights[lamp_index]
+        light, maps = self.lights[lamp_index], self._maps
+        key = (light, window)
+        if key in maps.kept:
+            return maps.kept[key]
         width, height = self._pass.size(light)
-        if self._changes(light) or self._kept_bytes >= CACHE_BYTES:
-            if (width, height) not in self._shared:
-                self._shared[width, height] = self._pass.new_texture(light)
-            texture = self._shared[width, height]
+        if self._changes(light) or maps.kept_bytes >= CACHE_BYTES:
+            if (width, height) not in maps.shared:
+                maps.shared[width, height] = self._pass.new_texture(light)
+            texture = maps.shared[width, height]
             return self._pass.render(self._geometry, light, sample_index, sample_count, together, texture, window)
-        self._kept[key] = self._pass.render(self._geometry, light, sample_index, sample_count, window=window)
-        self._kept_bytes += 4 * width * height
-        return self._kept[key]
+        maps.kept[key] = self._pass.render(self._geometry, light, sample_index, sample_count, window=window)
+        maps.kept_bytes += 4 * width * height
+        return maps.kept[key]
 
     def samples_of(self, lamp_index: int, most: int) -> int:
         """How many samples of a lamp differ, at most `most`."""
