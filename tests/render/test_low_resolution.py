@@ -176,7 +176,9 @@ def splinters() -> Iterator[tuple[float, float]]:
 
 def test_share_falls_with_the_thresholds(device: Device) -> None:
     shares = [
-        Run(device, room_with_block(), smooth, LowResolutionSettings(2, 0.2, reach, 2.0)).counters["low_resolution_share"]
+        Run(device, room_with_block(), smooth, LowResolutionSettings(2, 0.2, reach, 2.0)).counters[
+            "low_resolution_share"
+        ]
         for reach in (1.0, 0.2, 0.08, 0.06, 0.01)
     ]
     assert shares == sorted(shares, reverse=True)

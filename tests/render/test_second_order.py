@@ -76,7 +76,7 @@ def placed(device: Device, room: SceneSnapshot, counts: Sequence[int]) -> list[P
         found = []
         for count in counts:
             source = IndirectLights(context, device.shaders, maps)
-            lights = source.take(count)
+            (lights,) = source.take(count)
             share = bound.share(uploaded(context, light_records(lights, WORLD)), float(source.brightest.mean()))
             found.append((lights, source.brightest, 1.0 / (1.0 - share)))
     return found
@@ -192,6 +192,31 @@ def test_light_switched_off_and_ten_lamps_and_none(device: Device) -> None:
         frame = rendered(device, scene)
         assert not frame.images["irradiance"].any()
         assert frame.counters["indirect_lights"] == frame.counters["negative_lights"] == 0
+
+
+def test_lights_are_kept_while_nothing_but_the_camera_moves(device: Device) -> None:
+    room = empty_room([MIDDLE])
+    rendered(device, room)
+    built = device.kept.built["indirect_lights"]
+    moved = rendered(device, replace(room, camera=camera_at((1.0, 0.5, 0.3), (-0.5, 0.0, 0.0), lens=20.0)))
+    assert device.kept.built["indirect_lights"] == built
+    assert moved.counters["reflective_maps_drawn"] == 0
+    fresh = Device()
+    with fresh:
+        again = rendered(fresh, replace(room, camera=camera_at((1.0, 0.5, 0.3), (-0.5, 0.0, 0.0), lens=20.0)))
+    assert (moved.images["irradiance"] == again.images["irradiance"]).all()
+    rendered(device, empty_room([replace(MIDDLE, position=(0.1, 0.0, 0.0))]))
+    assert device.kept.built["indirect_lights"] == built + 1
+
+
+def test_light_of_the_world_bounces_as_in_the_gather_from_maps(device: Device) -> None:
+    scene = replace(box_room(), lights=(), world_radiance=(1.0, 0.9, 0.8))
+    means = []
+    for technique, values in (("second_order", {"negative_lights": 0}), ("rsm_gather", {"samples": 300})):
+        settings = RenderSettings(32, 24, technique, {**values, "resolution": 64}, 4, 64, 4, world_lights=8)
+        means.append(device.render(scene, None, settings).images["indirect"].mean(axis=(0, 1)))
+    assert means[0].min() > 0.01
+    np.testing.assert_allclose(means[0], means[1], rtol=0.1)
 
 
 def test_light_count_0_leaves_direct_light_alone(device: Device) -> None:

@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.mesh_topology import Int64
 from ..core.scene import Float64
 from ..core.vpl import VirtualPointLights
 from ..core.vpl_placement import share_out
 from .gpu_layout import CONSTANTS, VIRTUAL_POINT_LIGHT
 from .local_space import LocalSpace
-from .map_places import MapPlaces, Places, places_in
+from .map_places import Places, places_in
 from .passes.rsm import LampReflections, ReflectiveShadowMap
 from .shader_library import ShaderLibrary, set_uniforms
 
@@ -33,16 +34,27 @@ FIRST_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
 
 @dataclass(frozen=True)
 class _Picked:
-    """Lights of one map, world space. texel_areas: (n,) m², what a texel covers there. share: of its lamp, which the
-    map shows: what other maps of the lamp show is largely the same surface."""
+    """What is in some texels of a map, and lit. records: (n,) of VIRTUAL_POINT_LIGHT, in the map's units. areas: (n,)
+    float64, of the texels, likewise. texels: (n,) float64, how many such texels each stands for."""
 
-    lights: VirtualPointLights
-    texel_areas: Float64
+    records: np.ndarray
+    areas: Float64
+    texels: Float64
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A map. flux: W, what it reflects, mean of the channels. share: of the surfaces in it, which it lights for its
+    lamp or for the world: the other maps of these show much the same surfaces."""
+
+    places: Places
+    flux: float
     share: float
+    space: LocalSpace
 
 
 class IndirectLights:
-    """Places the lights of a frame, for each picture others.
+    """Places the lights of a frame.
 
     flux: (3,) float64 W, all that the maps' surfaces reflect. brightest: (3,) float64 W/m², what no irradiance exceeds.
     """
@@ -53,59 +65,67 @@ class IndirectLights:
         units = {f"RSM_{name}_UNIT": FIRST_UNIT + i for i, name in enumerate(("POSITION", "NORMAL", "FLUX"))}
         bindings = {"TEXEL_BINDING": TEXEL_BINDING, "PICKED_BINDING": PICKED_BINDING}
         self._shader = shaders.compute("passes/rsm_pick.comp", {"GROUP_SIZE": GROUP_SIZE, **units, **bindings})
-        self._fluxes: list[float] = []
-        self._places: list[Places] = []
         self.flux, self.brightest = np.zeros(3), np.zeros(3)
+        sources, is_world = [], []
         for index, found in enumerate(maps.maps()):
             flux = found.total_flux() * found.space.unit**2
             self.flux += flux
             self.brightest += found.brightest
-            self._fluxes.append(float(flux.mean()))
-            self._places.append(places_in(found.record, found.side, 1 + index * POINTS_APART))
+            places = places_in(found.record, found.side, 1 + index * POINTS_APART)
+            sources.append(_Source(places, float(flux.mean()), float(found.record["sample_weight"][0]), found.space))
+            is_world.append(float(found.record["world_solid_angle"][0]) > 0.0)
+        of_world = sum(source.flux for source, world in zip(sources, is_world, strict=True) if world)
+        self._sources = [
+            replace(source, share=source.flux / of_world) if world and source.flux > 0.0 else source
+            for source, world in zip(sources, is_world, strict=True)
+        ]
 
-    def take(self, count: int, pictures: int = 1) -> VirtualPointLights:
-        """The next `count` lights in world space; fewer where lamps light next to nothing of what they see.
+    def take(self, count: int, pictures: int = 1) -> list[VirtualPointLights]:
+        """`count` lights in world space for each of `pictures`, in all other places; fewer where lamps light next to
+        nothing of what they see.
 
-        They share `count` by what the maps reflect, and together send out all of it, mean of the channels. pictures:
-        how many such sets are averaged, so that a light's piece of surface is a part of what it alone would stand for.
+        They share `count` by what the maps reflect, and together send out all of it, mean of the channels. Pictures are
+        averaged, so a light's piece of surface is a part of what it would stand for alone.
         """
-        counts = share_out(count, np.array(self._fluxes))
+        counts = share_out(count, np.array([source.flux for source in self._sources]))
         if not sum(counts):
-            return NO_LIGHTS
-        places = [chosen.take(LOOKED_UP * number) for chosen, number in zip(self._places, counts, strict=True)]
-        picked = self._pick(places, counts)
+            return [NO_LIGHTS] * pictures
+        found = self._pick([number * pictures for number in counts])
+        parts = [np.array_split(np.arange(len(picked.areas)), pictures) for picked in found]
+        return [self._together(found, [rows[picture] for rows in parts], pictures) for picture in range(pictures)]
+
+    def _together(self, found: list[_Picked], parts: list[Int64], pictures: int) -> VirtualPointLights:
+        """One picture's lights: of what was found in each map, those in its rows."""
         scaled = [
-            _scaled(found, flux, pictures)
-            for found, flux in zip(picked, self._fluxes, strict=True)
-            if len(found.texel_areas)
+            _scaled(picked, rows, source, pictures)
+            for picked, rows, source in zip(found, parts, self._sources, strict=True)
+            if len(rows)
         ]
         if not scaled:
             return NO_LIGHTS
         names = ("positions", "normals", "flux", "areas")
-        together = VirtualPointLights(*(np.concatenate([getattr(lights, name) for lights in scaled]) for name in names))
+        lights = VirtualPointLights(*(np.concatenate([getattr(part, name) for part in scaled]) for name in names))
         # Maps that got no light leave theirs to the others.
-        missing = float(self.flux.mean()) / float(together.flux.mean(axis=1).sum())
-        return VirtualPointLights(
-            together.positions, together.normals, together.flux * missing, together.areas * missing
-        )
+        missing = float(self.flux.mean()) / float(lights.flux.mean(axis=1).sum())
+        return VirtualPointLights(lights.positions, lights.normals, lights.flux * missing, lights.areas * missing)
 
-    def _pick(self, places: list[MapPlaces], most: list[int]) -> list[_Picked]:
-        """What is at the places of each map: the first of it, up to as many as its part of `most`."""
+    def _pick(self, most: list[int]) -> list[_Picked]:
+        """What is lit at places of each map, up to as many as its part of `most`."""
+        places = [source.places.take(LOOKED_UP * number) for source, number in zip(self._sources, most, strict=True)]
         counts = [len(chosen.shares) for chosen in places]
         texels = self._context.buffer(np.concatenate([chosen.texels for chosen in places]).astype(np.int32).tobytes())
         results = self._context.buffer(reserve=VIRTUAL_POINT_LIGHT.dtype.itemsize * sum(counts))
-        seen, first = [], 0
+        first = 0
         for found, count in zip(self._maps.maps(), counts, strict=True):
-            seen.append((found.space, float(found.record["sample_weight"][0])))
             if count:
                 self._run(found, texels, results, first, count)
             first += count
-        records = np.frombuffer(results.read(), VIRTUAL_POINT_LIGHT.dtype)
-        parts = np.split(records, np.cumsum(counts)[:-1])
-        return [
-            _in_world(part, chosen, number, space, share)
-            for part, chosen, number, (space, share) in zip(parts, places, most, seen, strict=True)
-        ]
+        parts = np.split(np.frombuffer(results.read(), VIRTUAL_POINT_LIGHT.dtype), np.cumsum(counts)[:-1])
+        picked = []
+        for records, chosen, number in zip(parts, places, most, strict=True):
+            lit = np.flatnonzero(records["flux"].max(axis=1) > 0.0)[:number]
+            picked.append(_Picked(records[lit], records["area"][lit].astype(np.float64), chosen.shares[lit]))
+        return picked
 
     def _run(
         self, found: ReflectiveShadowMap, texels: moderngl.Buffer, results: moderngl.Buffer, first: int, count: int
@@ -118,30 +138,15 @@ class IndirectLights:
         self._context.memory_barrier()
 
 
-def _in_world(records: np.ndarray, places: MapPlaces, most: int, space: LocalSpace, share: float) -> _Picked:
-    """Of the first `most` records that are lit."""
-    lit = np.flatnonzero(records["flux"].max(axis=1) > 0.0)[:most]
-    records, shares = records[lit], places.shares[lit]
-    texel_areas = records["area"].astype(np.float64) * space.unit**2
-    return _Picked(
-        VirtualPointLights(
-            np.asarray(space.world_points(records["position"]), np.float64),
-            records["normal"].astype(np.float64),
-            records["flux"].astype(np.float64) * (shares * space.unit**2)[:, None],
-            texel_areas * shares,
-        ),
-        texel_areas,
-        share,
-    )
-
-
-def _scaled(picked: _Picked, flux: float, pictures: int) -> VirtualPointLights:
-    """The lights of a map that reflects `flux`, W, mean of the channels."""
-    lights = picked.lights
-    factor = flux / float(lights.flux.mean(axis=1).sum())
+def _scaled(picked: _Picked, rows: Int64, source: _Source, pictures: int) -> VirtualPointLights:
+    """Some of what was found in a map, sending out all that it reflects."""
+    records, space, texels = picked.records[rows], source.space, picked.texels[rows]
+    flux = records["flux"].astype(np.float64) * (texels * space.unit**2)[:, None]
+    factor = source.flux / float(flux.mean(axis=1).sum())
     # Several lights may be in one texel, and none stands for less.
-    areas = np.maximum(lights.areas * (factor / pictures), picked.texel_areas) * picked.share
-    return VirtualPointLights(lights.positions, lights.normals, lights.flux * factor, areas)
+    areas = picked.areas[rows] * np.maximum(texels * (factor / pictures), 1.0) * source.share
+    positions = np.asarray(space.world_points(records["position"]), np.float64)
+    return VirtualPointLights(positions, records["normal"].astype(np.float64), flux * factor, areas * space.unit**2)
 
 
 def light_records(lights: VirtualPointLights, space: LocalSpace, gain: float = 1.0) -> np.ndarray:

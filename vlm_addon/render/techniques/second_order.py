@@ -11,9 +11,10 @@ import numpy as np
 from ...core.array_codec import content_hash
 from ...core.halton import halton_points
 from ...core.progress import Progress
-from ...core.scene import Float32
+from ...core.scene import Float32, Float64
 from ...core.settings import setting
 from ...core.surface_points import SurfacePoints, random_surface_points
+from ...core.vpl import VirtualPointLights
 from ..gpu_layout import VIRTUAL_POINT_LIGHT
 from ..indirect_lights import IndirectLights, light_records
 from ..passes.accumulate import read_image
@@ -71,6 +72,14 @@ class Settings(LowResolutionSettings, Placement):
     """Lights, and where a low resolution does."""
 
 
+@dataclass(frozen=True)
+class PlacedLights:
+    """The lights of each picture of a frame, in world space. brightest: (3,) W/m², what no irradiance exceeds."""
+
+    pictures: tuple[VirtualPointLights, ...]
+    brightest: Float64
+
+
 class NegativeLightPass:
     """Places negative lights on pixels of a picture."""
 
@@ -96,8 +105,8 @@ class NegativeLightPass:
         pixel_buffer.bind_to_storage_buffer(PIXEL_BINDING)
         found.buffer.bind_to_storage_buffer(NEGATIVE_BINDING)
         at_0, per_depth = (across / width for across in view.picture_width(width))
-        uniforms = {"light_count": lights.count, "is_orthographic": view.is_orthographic}
-        uniforms |= {"width_at_0": at_0, "width_per_depth": per_depth}
+        uniforms = {"width_at_0": at_0, "width_per_depth": per_depth}
+        uniforms |= {"light_count": lights.count, "is_orthographic": view.is_orthographic}
         uniforms |= {"camera_position": view.position.tolist(), "camera_backward": view.backward.tolist()}
         set_uniforms(self._shader, uniforms)
         self._shader.run(tried)
@@ -135,14 +144,14 @@ class SecondOrder(Technique):
         context, shaders = scene.context, scene.shaders
         self._maps = LampReflections(context, shaders, scene.kept, scene.world, settings.resolution, settings.area_maps)
         with scene.timer.measure("reflective shadow maps"):
-            self._maps.draw()
-            self._placed = IndirectLights(context, shaders, self._maps)
+            self._placed = self._placed_lights()
         width, height = scene.settings.width, scene.settings.height
         self._negative_pass = NegativeLightPass(context, shaders)
         self._passes = SizedPasses(lambda wide, high: PointLightPass(context, shaders, wide, high))
         self._low = LowResolutionGather(context, shaders, width, height, settings, scene.settings.buffers)
         self._finish = shaders.compute("techniques/second_order_finish.comp", {"GROUP_SIDE": GROUP_SIDE})
-        self._removed: float | None = None
+        with scene.timer.measure("indirect lights"):
+            self._removed = self._bound_share()
         self._lights = self._negative = self._none = uploaded(context, VIRTUAL_POINT_LIGHT.zeros(0))
         self._irradiance: moderngl.Texture | None = None
         self._frame: FrameInputs | None = None
@@ -151,7 +160,10 @@ class SecondOrder(Technique):
         """Sum over the lights of flux times the bounded geometry term, less that of the negative ones."""
         timer, chosen = self.scene.timer, self.chosen
         with timer.measure("indirect lights"):
-            self._lights = self._placed_lights()
+            records = light_records(
+                self._placed.pictures[frame.sample_index], self.scene.space, 1.0 / (1.0 - self._removed)
+            )
+            self._lights = uploaded(self.scene.context, records)
         self._negative = self._none
         if self._lights.count and chosen.negative_lights:
             with timer.measure("negative lights"):
@@ -168,17 +180,25 @@ class SecondOrder(Technique):
         self._frame = frame
         return self._irradiance
 
-    def _placed_lights(self) -> PointLights:
-        """The next picture's indirect lights, on the device."""
+    def _placed_lights(self) -> PlacedLights:
+        """All lights of the frame, kept over frames: they change with the lamps and with what these light."""
+        scene, count = self.scene, self.chosen.indirect_lights
+        pictures = scene.settings.samples
+
+        def place() -> PlacedLights:
+            self._maps.draw()
+            source = IndirectLights(scene.context, scene.shaders, self._maps)
+            return PlacedLights(tuple(source.take(count, pictures)), source.brightest)
+
+        return scene.kept.get("indirect_lights", content_hash([self._maps.key, count, pictures]), place)
+
+    def _bound_share(self) -> float:
+        """Of the light on all surfaces, what the bounded geometry term takes off."""
         context, space = self.scene.context, self.scene.space
-        found = self._placed.take(self.chosen.indirect_lights, self.scene.settings.samples)
-        if self._removed is None:
-            receivers = self._receivers()
-            points = space.local_points(receivers.positions)
-            bound = BoundPass(context, self.scene.shaders, points, receivers.normals)
-            brightest = float(self._placed.brightest.mean())
-            self._removed = bound.share(uploaded(context, light_records(found, space)), brightest)
-        return uploaded(context, light_records(found, space, 1.0 / (1.0 - self._removed)))
+        receivers = self._receivers()
+        bound = BoundPass(context, self.scene.shaders, space.local_points(receivers.positions), receivers.normals)
+        first = uploaded(context, light_records(self._placed.pictures[0], space))
+        return bound.share(first, float(self._placed.brightest.mean()))
 
     def _receivers(self) -> SurfacePoints:
         """Points of all surfaces, the same for the same scene."""
@@ -200,7 +220,7 @@ class SecondOrder(Technique):
             "negative_lights": self._negative.count,
             "negative_flux": float(negative["flux"].mean(axis=1).sum()) * self.scene.space.unit**2,
             "negative_removes_share": self._negative_share(),
-            "bound_removes_share": self._removed or 0.0,
+            "bound_removes_share": self._removed,
             **self._low.counters(),
             "reflective_maps": len(self._maps),
             "reflective_maps_drawn": self._maps.drawn,
