@@ -36,7 +36,7 @@ def hall(block_at: float = 0.0, lights: tuple[Light, ...] = (LEFT, RIGHT)) -> Sc
 
 
 def rendered(device: Device, snapshot: SceneSnapshot, samples: int = 1, **settings: object) -> Frame:
-    values = {"resolution": 32, "samples": 20, **settings}
+    values = {"resolution": 32, "samples": 20, "low_resolution": 1, **settings}
     return device.render(snapshot, None, RenderSettings(24, 16, "rsm_gather", values, samples, 64, 4))
 
 
@@ -156,6 +156,28 @@ def test_lamps_switched_off_and_on_leave_nothing_behind(used: Device) -> None:
     again = rendered(used, hall())
     assert drawn(again) == 2
     assert same(again, both)
+
+
+def test_a_lamp_that_sees_nothing_then_turns_and_one_that_goes_into_a_block(used: Device) -> None:
+    away = replace(RIGHT, x_axis=(1.0, 0.0, 0.0), y_axis=(0.0, -1.0, 0.0), z_axis=(0.0, 0.0, -1.0))
+    nothing = rendered(used, hall(lights=(away,)))
+    assert not nothing.images["indirect"].any()
+    assert nothing.counters["reflective_maps"] == 1
+    turned = rendered(used, hall(lights=(RIGHT,)))
+    assert turned.images["indirect"].any()
+    assert same(turned, fresh(hall(lights=(RIGHT,))))
+    inside = hall(3.0, lights=(replace(RIGHT, position=(3.0, 0.0, 0.2)),))
+    assert not rendered(used, inside).images["indirect"].any()
+
+
+def test_ten_lamps_at_once_are_the_sum_of_each(used: Device) -> None:
+    lamps = [
+        replace(LEFT, position=(-3.0 + 0.6 * i, 0.1 * i, 2.0), power=(3.0 * i + 1.0, 10.0, 5.0)) for i in range(10)
+    ]
+    alone = [rendered(used, hall(lights=(lamp,))).images["indirect"] for lamp in lamps]
+    together = rendered(used, hall(lights=tuple(lamps)))
+    assert together.counters["reflective_maps"] == 10
+    np.testing.assert_allclose(together.images["indirect"], np.sum(alone, axis=0), rtol=1e-4, atol=1e-7)
 
 
 def test_order_of_the_lamps_moves_no_map(used: Device) -> None:

@@ -130,9 +130,11 @@ class RsmGather(Technique):
         super().__init__(scene, settings)
         width, height = scene.settings.width, scene.settings.height
         lit = replace(scene.world, lights=merged_world_lights(scene.world.lights, settings.world_maps))
-        self._maps = LampReflections(
-            scene.context, scene.shaders, scene.kept, lit, settings.resolution, settings.area_maps
-        )
+        with scene.timer.measure("reflective shadow maps"):
+            self._maps = LampReflections(
+                scene.context, scene.shaders, scene.kept, lit, settings.resolution, settings.area_maps
+            )
+            self._maps.draw()
         self._low = LowResolutionGather(
             scene.context, scene.shaders, width, height, settings, keep_low=scene.settings.buffers
         )
@@ -144,8 +146,6 @@ class RsmGather(Technique):
         self._irradiance: moderngl.Texture | None = None
         self._brightest = (0.0, 0.0, 0.0)
         self._marks: Marks | None = None
-        with scene.timer.measure("reflective shadow maps"):
-            self._maps.draw()
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the maps' samples of flux times the bounded geometry term."""
