@@ -23,11 +23,13 @@ def evaluate(
     inputs: Mapping[str, np.ndarray],
     components: int = 1,
     preamble: str = "",
+    defines: Mapping[str, int] | None = None,
 ) -> np.ndarray:
     """float32 (n,) or (n, components): `expression` for each row of `inputs`.
 
     include: file or files under `gpu_shaders/`. inputs: by the name that `expression` uses, (n,) for a float or an
-    int (int32 arrays become int), (n, 2..4) for a vector. preamble: GLSL at file scope.
+    int (int32 arrays become int), (n, 2..4) for a vector. preamble: GLSL at file scope. defines: what the
+    files need besides the constants that all shaders see.
     """
     columns, declarations, width = [], [], 0
     for name, values in inputs.items():
@@ -64,7 +66,7 @@ def evaluate(
         ]
     )
     with device.current() as context:
-        shader = device.shaders.compute_from_text(text, f"shader function {next(_names)}")
+        shader = device.shaders.compute_from_text(text, f"shader function {next(_names)}", defines)
         source = context.buffer(packed.tobytes())
         target = context.buffer(reserve=4 * components * rows)
         source.bind_to_storage_buffer(_INPUT_BINDING)

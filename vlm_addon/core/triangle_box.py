@@ -14,10 +14,14 @@ from .scene import Float64
 
 Bools = npt.NDArray[np.bool_]
 
+# Six roundings in a component of the normal and in its share of the height.
+_PLANE_ROUNDING = 6.0 * 2.0**-53
+
 
 def triangles_meet_cubes(corners: Float64, centres: Float64, half: float) -> Bools:
     """(n,) whether triangle i of (n, 3, 3) corners and the cube of side 2 `half` around (n, 3) centre i have a point in
-    common. Rounding decides where they miss each other by less than some 1e-15 of the coordinates."""
+    common. Those that miss each other by some 1e-13 of the coordinates or less may count as meeting, never the reverse
+    but for as much."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     meets = ((low <= centres + half) & (high >= centres - half)).all(axis=1)
     rows = np.flatnonzero(meets)
@@ -28,9 +32,13 @@ def triangles_meet_cubes(corners: Float64, centres: Float64, half: float) -> Boo
 
 def _plane_meets(local: Float64, half: float) -> Bools:
     """Whether the triangle's plane meets the cube."""
-    normal = np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])
+    sides = local[:, 1] - local[:, 0], local[:, 2] - local[:, 0]
+    normal = np.cross(*sides)
     height = np.abs(np.einsum("ij,ij->i", normal, local[:, 0]))
-    return np.asarray(height <= half * np.abs(normal).sum(axis=1))
+    # Of three points in a line the normal is nothing but rounding and says nothing.
+    longest = [np.abs(side).max(axis=1) for side in sides]
+    rounding = _PLANE_ROUNDING * longest[0] * longest[1] * np.abs(local[:, 0]).sum(axis=1)
+    return np.asarray(height <= half * np.abs(normal).sum(axis=1) + rounding)
 
 
 def _silhouettes_meet(local: Float64, half: float) -> Bools:
