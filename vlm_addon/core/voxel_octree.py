@@ -6,8 +6,8 @@ follow from the way down, children that are empty need no place, and visibility 
 word: its lower 8 bits say which of the octants have children, the upper 24 where the first of those stands; the others
 follow it. The lowest two levels are one 64-bit mask, a brick of 4 x 4 x 4 voxels: a voxel costs some bits, not 16
 bytes. Levels follow each other from the root down, each in the order of the Z-order curve, so the same voxels are the
-same tree, bit for bit. Octant x + 2 y + 4 z; a voxel's place in its brick is 8 times the octant of 2 x 2 x 2 voxels plus
-the voxel in it.
+same tree, bit for bit. Octants are x + 2 y + 4 z; a voxel's place in its brick is 8 times the octant of
+2 x 2 x 2 voxels plus its own in there.
 """
 
 from __future__ import annotations
