@@ -32,6 +32,7 @@ vec4 history_of(ivec2 pixel, out float pictures) {
     pictures = 0.0;
     vec3 p = history_scale * texelFetch(gbuffer_position, pixel, 0).xyz + history_offset;
     vec3 n = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
+    vec3 plane = texelFetch(gbuffer_geometric_normal, pixel, 0).xyz;
     vec4 clip = clip_from_history * vec4(p, 1.0);
     ivec2 size = textureSize(history_place, 0);
     // From the middle of the first pixel; a place behind the camera, or far beside it, is in no picture.
@@ -56,7 +57,7 @@ vec4 history_of(ivec2 pixel, out float pictures) {
         vec4 seen = texelFetch(history_place, texel, 0);
         vec4 value = texelFetch(history_irradiance, texel, 0);
         // Pixels aside are elsewhere along the surface: only the distance from it tells another surface.
-        bool is_same = seen.w > 0.0 && abs(dot(seen.xyz - p, n)) < reach
+        bool is_same = seen.w > 0.0 && abs(dot(seen.xyz - p, plane)) < reach
             && dot(texelFetch(history_normal, texel, 0).xyz, n) > SAME_NORMAL_COSINE;
         if (is_same && is_usable(value)) {
             sum += weight * value;
