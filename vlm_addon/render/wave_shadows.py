@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..core.light_wave import SPREAD_LIGHTS, Wave, sampled_frames, sampled_lights, spread_frames, spread_lights
 from ..core.scene import Float64
 from ..core.stacked_hemispheres import integrated_shadow_count, shadow_map_bytes
+from .geometry import GpuGeometry
+from .local_space import LocalSpace, make_local_space
 from .passes.gbuffer import GBuffer
 from .passes.wave_shadow import WaveMapPass, WaveMaps, WaveShadowPass
 from .technique import SceneInputs
@@ -32,6 +37,26 @@ class WaveShadowSettings:
     maps: int
     steps: int
     scale: float
+
+
+class _StillScene:
+    """The scene in a space that does not follow the camera, uploaded when a map is to be drawn: maps that are kept
+    while the camera moves are then the same as those that another frame would draw."""
+
+    def __init__(self, scene: SceneInputs, draw_pass: WaveMapPass) -> None:
+        self._scene = scene
+        self._pass = draw_pass
+
+    def draw(self, positions: Float64, frames: Float64) -> WaveMaps:
+        """Maps as by WaveMapPass."""
+        geometry, space = self._uploaded
+        return self._pass.draw(geometry, space, positions, frames)
+
+    @cached_property
+    def _uploaded(self) -> tuple[GpuGeometry, LocalSpace]:
+        world = replace(self._scene.world, camera=None)
+        space = make_local_space(world)
+        return GpuGeometry(self._scene.context, space.scene(world), np.zeros(3)), space
 
 
 class WaveShadows:
@@ -59,8 +84,8 @@ class WaveShadows:
         if self.map_count:
             occluders = occluders_key(scene.world)
             with scene.timer.measure("indirect shadow maps"):
-                draw = (self._map_pass, scene.geometry, scene.space)
-                self._maps = [store.maps(*draw, places, occluders, size) for places in lights]
+                still = _StillScene(scene, self._map_pass)
+                self._maps = [store.maps(still.draw, places, occluders, size) for places in lights]
 
     def visibility(self, gbuffer: GBuffer, index: int) -> moderngl.Texture | None:
         """Share of a wave that each pixel sees, R32F; None where nothing is shadowed. The next call overwrites it."""

@@ -10,9 +10,7 @@ from typing import Any, TypeVar
 from ..core.array_codec import content_hash
 from ..core.light_wave import Wave, WaveSettings, lamp_waves
 from ..core.scene import NO_TEXTURE, Float64, Light, SceneSnapshot
-from .geometry import GpuGeometry
-from .local_space import LocalSpace
-from .passes.wave_shadow import WaveMapPass, WaveMaps
+from .passes.wave_shadow import WaveMaps
 
 T = TypeVar("T")
 
@@ -46,18 +44,17 @@ class WaveStore:
 
     def maps(
         self,
-        draw_pass: WaveMapPass,
-        geometry: GpuGeometry,
-        space: LocalSpace,
+        draw: Callable[[Float64, Float64], WaveMaps],
         places: tuple[Float64, Float64],
         occluders: str,
         size: tuple[int, ...],
     ) -> WaveMaps:
-        """Maps of the lights at `places` (positions and frames in world space). occluders: of occluders_key."""
+        """Maps of the lights at `places` (positions and frames in world space), drawn by `draw` of both. occluders: of
+        occluders_key."""
 
         def make() -> WaveMaps:
             self.drawn += len(places[0])
-            return draw_pass.draw(geometry, space, *places)
+            return draw(*places)
 
         return self._get(content_hash(["maps", *places, occluders, size]), make)
 
