@@ -313,6 +313,15 @@ def test_maps_that_need_too_much_memory_get_smaller_and_say_so(device: Device, m
     assert any("1.00 times" in reason for reason in frame.reasons)
 
 
+def test_more_corners_than_pixels_are_told(device: Device) -> None:
+    few, many = (
+        device.render(furnished(SPOT_LAMP), None, RenderSettings(side, side, "lightwave", {"angle": 45.0}, 1, 32, 1))
+        for side in (4, 16)
+    )
+    assert any("computed_at=pixels" in reason for reason in few.reasons)
+    assert not many.reasons
+
+
 def test_strength_multiplies_all_of_the_indirect_light(device: Device) -> None:
     once, twice = (rendered(device, glossy(0.5), strength=strength) for strength in (1.0, 2.0))
     for name in ("irradiance", "lightwave_specular"):

@@ -267,5 +267,10 @@ class LightWave(Technique):
         return image
 
     def reasons(self) -> list[str]:
-        """Why maps are smaller than asked for."""
-        return self._shadows.reasons()
+        """Why maps are smaller than asked for, and where pixels would be done sooner than corners."""
+        settings = self.scene.settings
+        pixels = settings.width * settings.height * settings.samples
+        if not self._corner_sums or self._corners.count <= pixels:
+            return self._shadows.reasons()
+        slow = f"light is computed at {self._corners.count:,} corners, more than there are pixels; try computed_at={PIXELS}"
+        return [*self._shadows.reasons(), slow]
