@@ -84,14 +84,13 @@ def problems(snapshot):
 
 
 TURNS = {
-    "not turned": {},
     "about all": {"rotation": (0.4, -0.9, 2.0)},
     "as a texture": {"rotation": (0.4, -0.9, 2.0), "vector_type": "TEXTURE"},
     "scaled": {"rotation": (0.0, 0.3, 0.0), "scale": (2.0, 2.0, 2.0)},
 }
 
 
-VIEWS = [*((name, "PERSP") for name in TURNS), ("scaled", "ORTHO")]
+VIEWS = [("about all", "PERSP"), ("as a texture", "PERSP"), ("scaled", "ORTHO")]
 
 
 @pytest.mark.parametrize(("turn", "kind"), VIEWS)
@@ -104,7 +103,7 @@ def test_the_background_shows_where_cycles_shows_it(device, world, make_camera, 
     snapshot = extract_scene()
     assert problems(snapshot) == []
     ours = device.render(snapshot, None, RenderSettings(WIDTH, HEIGHT, "direct", samples=16)).images["combined"]
-    cycles = render_reference(WIDTH, HEIGHT, 0, 8).images["combined"]
+    cycles = render_reference(WIDTH, HEIGHT, 0, 32).images["combined"]
     assert ours[..., :3] == pytest.approx(cycles, rel=0.01, abs=0.01)
     if kind == "PERSP":
         assert np.ptp(cycles, axis=(0, 1)).min() > 0.3
@@ -142,13 +141,13 @@ def relative_rmse(ours, reference):
     return math.sqrt(np.mean((ours - reference) ** 2)) / reference.mean()
 
 
-@pytest.mark.parametrize(("sky", "error"), [("even", 0.06), ("sun", 0.05)])
+@pytest.mark.parametrize(("sky", "error"), [("even", 0.08), ("sun", 0.06)])
 def test_direct_light_of_the_sky_is_that_of_cycles(device, world, courtyard, sky, error):
     courtyard()
     if sky == "sun":
         add_picture(world, sun_picture(), rotation=(0.0, 0.0, 0.4))
     snapshot = extract_scene()
-    settings = RenderSettings(48, 36, "direct", samples=16, shadow_resolution=512)
+    settings = RenderSettings(48, 36, "direct", samples=8, shadow_resolution=512)
     ours = device.render(snapshot, None, settings).images["direct"]
     reference = render_reference(48, 36, 0, 128).images["direct"]
     assert reference.mean() > 0.0
