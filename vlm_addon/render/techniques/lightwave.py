@@ -272,5 +272,5 @@ class LightWave(Technique):
         pixels = settings.width * settings.height * settings.samples
         if not self._corner_sums or self._corners.count <= pixels:
             return self._shadows.reasons()
-        slow = f"light is computed at {self._corners.count:,} corners, more than there are pixels; try computed_at={PIXELS}"
-        return [*self._shadows.reasons(), slow]
+        slow = f"light is computed at {self._corners.count:,} corners, more than there are pixels"
+        return [*self._shadows.reasons(), f"{slow}; try computed_at={PIXELS}"]
