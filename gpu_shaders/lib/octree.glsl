@@ -5,6 +5,10 @@
 // step leaves the largest empty cube around it through one face, towards the last voxel and never past it along any
 // axis: at most as many steps as voxels along the three axes. Rounding may only change the order in which faces are
 // crossed, and no such way leads through a closed surface past all voxels that the surface meets.
+//
+// Software renderers end all loops of an invocation after 65,535 rounds together. A step takes as many as the tree has
+// levels, so whoever asks for many ways in one invocation asks for some dozens at a time; a way that is cut off counts
+// as blocked.
 #ifndef LIB_OCTREE
 #define LIB_OCTREE
 
@@ -93,7 +97,7 @@ bool octree_tree_clear(uint tree, vec3 start, vec3 end) {
         next[axis] = far[axis] + way[axis];
         cell = next;
     }
-    return true;
+    return false;
 }
 
 // Whether no tree has an occupied voxel between two points in voxel coordinates, the points' own voxels included.

@@ -90,17 +90,17 @@ def _octants(cells: Int64, shift: int) -> Int64:
 def segments_clear(tree: VoxelOctree, starts: Floats, ends: Floats) -> Bools:
     """(n,) whether no voxel between (n, 3) start and end in voxel coordinates, both included, is occupied.
 
-    The arithmetic is that of the points' type: float32 as on the device.
+    False for what is not finite. The arithmetic is that of the points' type: float32 as on the device.
     """
-    clear = np.ones(len(starts), bool)
-    rows = np.arange(len(starts))
-    cells, lasts = cells_at(starts), cells_at(ends)
+    clear = np.zeros(len(starts), bool)
+    rows = np.flatnonzero(np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1))
+    cells, lasts = cells_at(starts[rows]), cells_at(ends[rows])
     while len(rows):
         boxes = boxes_at(tree, cells)
-        clear[rows[boxes.occupied]] = False
         step = np.sign(lasts - cells)
         far = np.where(step > 0, boxes.high, boxes.low)
         leaves = ((step > 0) & (lasts > far)) | ((step < 0) & (lasts < far))
+        clear[rows] = ~boxes.occupied
         going = ~boxes.occupied & leaves.any(axis=1)
         rows, step, far, leaves, lasts = rows[going], step[going], far[going], leaves[going], lasts[going]
         cells = _next_cells(cells[going], starts[rows], ends[rows], far, step, leaves, lasts)

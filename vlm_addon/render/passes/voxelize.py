@@ -187,7 +187,7 @@ class VoxelizePass:
                 with self.pool.uploaded(np.zeros(1, np.uint32)) as total:
                     _bind(TRIANGLE=triangles, BLOCK=blocks, MEETING=meetings, TOTAL=total, BIT=bits)
                     self._run(self._test[is_last], count, values)
-                    meeting = _uint(total, 0)
+                    (meeting,) = self._uints(total, [0])
                 added = starting[level] if not is_last else starting[0][:0]
                 following = self._take(stack, _BLOCK_BYTES * (meeting + len(added)))
                 with self.pool.uploaded(np.zeros(1, np.uint32)) as total:
@@ -210,8 +210,8 @@ class VoxelizePass:
 
     def _allocated(self, ranks: moderngl.Buffer, layout: _Layout, target: GrowingBuffer) -> GpuTree:
         """The tree with its header and with bricks of zeros; a tree without anything has one node without children."""
-        starts = [_uint(ranks, word) for word in layout.starts[: layout.brick_level + 1]]
-        node_count, brick_count = max(starts[-1], 1), _uint(ranks, layout.words) - starts[-1]
+        *starts, total = self._uints(ranks, layout.starts)
+        node_count, brick_count = max(starts[-1], 1), total - starts[-1]
         if max(node_count, brick_count) > MOST_NODES:
             raise DeviceError(f"the octree has {max(node_count, brick_count):,} nodes; use a lower resolution")
         buffer = target.of(4 * (HEADER_WORDS + node_count + 2 * brick_count))
@@ -237,6 +237,13 @@ class VoxelizePass:
     def _take(self, stack: ExitStack, size: int) -> moderngl.Buffer:
         require_block(self._context, size, "voxelisation")
         return stack.enter_context(self.pool.take(size))
+
+    def _uints(self, buffer: moderngl.Buffer, indices: Sequence[int]) -> list[int]:
+        """Some words of a buffer: gathered on the device, as every reading waits for it."""
+        with self.pool.take(4 * len(indices)) as gathered:
+            for place, index in enumerate(indices):
+                self._context.copy_buffer(gathered, buffer, 4, read_offset=4 * index, write_offset=4 * place)
+            return np.frombuffer(gathered.read(4 * len(indices)), np.uint32).astype(int).tolist()
 
     def _zero(self, buffer: moderngl.Buffer, first: int, count: int) -> None:
         _bind(BIT=buffer)
@@ -276,7 +283,3 @@ def _header(depth: int, starts: Sequence[int]) -> bytes:
 def _bind(**buffers: moderngl.Buffer) -> None:
     for name, buffer in buffers.items():
         buffer.bind_to_storage_buffer(_BINDINGS[name])
-
-
-def _uint(buffer: moderngl.Buffer, index: int) -> int:
-    return int(np.frombuffer(buffer.read(4, offset=4 * index), np.uint32)[0])
