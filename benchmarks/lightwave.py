@@ -26,9 +26,11 @@ from benchmarks.support import open_sample, quiet
 from vlm_addon.blender.cycles_reference import Reference, render_reference
 from vlm_addon.core.metrics import rank_value, relative_rmse, similarity
 from vlm_addon.core.scene import SceneSnapshot
+from vlm_addon.core.settings import from_mapping
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.images import srgb_from_linear
+from vlm_addon.render.technique import technique_by_name
 from vlm_addon.terminal import table
 
 SHORT_DIVISOR = 8
@@ -62,7 +64,8 @@ class Bench:
 
     def measured(self, row: Row) -> Measured:
         """What a row of a table is about."""
-        key = repr((row.pots, row.technique, sorted(row.settings.items()), row.size))
+        chosen: object = from_mapping(technique_by_name(row.technique).settings, row.settings, row.label)
+        key = repr((row.pots, row.technique, chosen, row.size))
         if key not in self._found:
             self._found[key] = self._measure(row)
         return self._found[key]
