@@ -3,7 +3,7 @@
 
 `./dev bench second_order` takes monkey_box at 160 x 120; `--size 640x480` is what was published, and `--mesh` puts the
 Stanford bunny in the monkey's place where ../shared/models has it. A frame is one sample of every pixel. Its time is
-that of all passes but the upload of the geometry; "processor" is that of all threads in the technique, which means the
+that of all passes but the upload of the geometry; "processor" is that of all threads in the gather, which means the
 same on a busy machine (on a GPU it means nothing). Of --runs frames the one with the least of that counts. Errors are
 against the same frame gathered at every pixel: of the displayed picture (sRGB, of its whole range, as the published
 figure may be meant) and, which is stricter, of the indirect light alone (relative RMSE).
@@ -29,7 +29,7 @@ from vlm_addon.core.scene import Float64, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.images import srgb_encoded
-from vlm_addon.render.techniques.second_order import SecondOrder
+from vlm_addon.render.passes.low_resolution import LowResolutionGather
 from vlm_addon.terminal import table
 
 SCENE = "monkey_box"
@@ -55,7 +55,7 @@ TESTS: dict[str, tuple[dict[str, float], str, tuple[float, float]]] = {
 
 @dataclass(frozen=True)
 class Timed:
-    """A frame, and the processor milliseconds of its technique."""
+    """A frame, and the processor milliseconds of its gather."""
 
     frame: Frame
     processor: float
@@ -86,6 +86,7 @@ class Frames:
         self._runs = runs
         # Compiles shaders and draws the maps, which are kept.
         self._render((16, 12), {})
+        self._render(size, ALL_LOW)
 
     def once(self, values: Mapping[str, float]) -> Timed:
         """One frame with these settings."""
@@ -97,21 +98,21 @@ class Frames:
 
     def _render(self, size: tuple[int, int], values: Mapping[str, float]) -> Timed:
         settings = RenderSettings(*size, TECHNIQUE, values, 1, SHADOW_RESOLUTION, 1)
-        indirect, milliseconds = SecondOrder.indirect, []
+        render, milliseconds = LowResolutionGather.render, []
 
         def clocked(*inputs: object) -> object:
             self._device.context.finish()
             start = time.process_time()
-            result = indirect(*inputs)  # type: ignore[arg-type]
+            result = render(*inputs)  # type: ignore[arg-type]
             self._device.context.finish()
             milliseconds.append(1e3 * (time.process_time() - start))
             return result
 
-        SecondOrder.indirect = clocked  # type: ignore[method-assign,assignment]
+        LowResolutionGather.render = clocked  # type: ignore[method-assign,assignment]
         try:
             frame = self._device.render(self._scene, None, settings)
         finally:
-            SecondOrder.indirect = indirect  # type: ignore[method-assign]
+            LowResolutionGather.render = render  # type: ignore[method-assign]
         return Timed(frame, sum(milliseconds))
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from ...core.scene import Float32
 from ...core.settings import setting
 from ..buffer_pool import BufferPool
+from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS
 from ..prefix_sum import PrefixSum
 from ..shader_library import ShaderLibrary, set_uniforms
@@ -39,10 +40,25 @@ if TYPE_CHECKING:
 
 GROUP_SIDE = 8
 """Of the squares of neighbours that packed pixels come in, pixels."""
-MARK_IMAGE = 7
-"""After those of the picked pixels."""
-COUNT_BINDING, SHOWN_BINDING = 0, 1
+COUNT_BINDING, SHOWN_BINDING, LIST_BINDING = 0, 1, 2
+EMPTY, FILLED, REDONE = 0, 1, 2
+"""Marks of pixels without a surface, of those that the low resolution does for, and of the others."""
 FIRST_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
+DEFINES = {
+    "GROUP_SIDE": GROUP_SIDE,
+    "COUNT_BINDING": COUNT_BINDING,
+    "SHOWN_BINDING": SHOWN_BINDING,
+    "LIST_BINDING": LIST_BINDING,
+    "MARK_EMPTY": EMPTY,
+    "MARK_FILLED": FILLED,
+    "MARK_REDONE": REDONE,
+    "MARK_UNIT": FIRST_UNIT,
+    "LOW_POSITION_UNIT": FIRST_UNIT,
+    "LOW_NORMAL_UNIT": FIRST_UNIT + 1,
+    "LOW_RESULT_UNIT": FIRST_UNIT + 2,
+    "PICKED_PIXEL_UNIT": FIRST_UNIT,
+    "PICKED_RESULT_UNIT": FIRST_UNIT + 1,
+}
 P = TypeVar("P")
 
 
@@ -114,24 +130,15 @@ class SizedPasses(Generic[P]):
 
 
 class _PickedTextures:
-    """Textures that pixels are picked into."""
+    """Textures that pixels are picked into, by drawing into `framebuffer`."""
 
     def __init__(self, context: moderngl.Context, width: int, height: int) -> None:
         names = [field.name for field in fields(GBuffer)]
         kinds = {name: "i4" if name == "ids" else "f4" for name in names}
         images = {name: context.texture((width, height), 4, dtype=kind) for name, kind in kinds.items()}
         self.picked = PickedPixels(GBuffer(**images), context.texture((width, height), 2, dtype="i4"))
-        self._images = [*images.values(), self.picked.pixel]
-        self._facing = context.framebuffer([images["geometric_normal"]])
+        self.framebuffer = context.framebuffer([*images.values(), self.picked.pixel])
         self.groups = -(-width // GROUP_SIDE), -(-height // GROUP_SIDE)
-
-    def clear(self) -> None:
-        """Leaves no texel that shows a surface."""
-        self._facing.clear()
-
-    def bind(self) -> None:
-        for unit, image in enumerate(self._images):
-            image.bind_to_image(unit, read=False, write=True)
 
 
 class LowResolutionGather:
@@ -161,25 +168,28 @@ class LowResolutionGather:
         self._size = width, height
         self._result = IrradianceImage(context, width, height)
         self._marks = context.texture((width, height), 1, dtype="u1")
+        self._filled = context.framebuffer([self._result.texture, self._marks])
         self._groups = -(-width // GROUP_SIDE), -(-height // GROUP_SIDE)
         group_count = self._groups[0] * self._groups[1]
         # One value more than there are groups: there the prefix sum leaves the sum of all.
         self._counts = context.buffer(reserve=4 * (group_count + 1))
         self._shown = context.buffer(reserve=4)
+        self._list = context.buffer(reserve=8 * GROUP_SIDE**2 * group_count)
         factor = settings.low_resolution
         self._small = _PickedTextures(context, *(-(-(side - 1) // factor) + 1 for side in (width, height)))
         self._packed: dict[int, _PickedTextures] = {}
         self._prefix_sum = PrefixSum(context, shaders, BufferPool(context))
-        defines = {"GROUP_SIDE": GROUP_SIDE, "FACTOR": factor, "COUNT_BINDING": COUNT_BINDING}
-        names = ("LOW_POSITION", "LOW_NORMAL", "LOW_RESULT")
-        units = {f"{name}_UNIT": FIRST_UNIT + index for index, name in enumerate(names)}
-        picked_units = {"PICKED_PIXEL_UNIT": FIRST_UNIT, "PICKED_RESULT_UNIT": FIRST_UNIT + 1}
-        self._shrink = shaders.compute("passes/low_resolution_shrink.comp", defines)
-        self._blend = shaders.compute(
-            "passes/low_resolution_blend.comp", {**defines, **units, "SHOWN_BINDING": SHOWN_BINDING}
-        )
-        self._pack = shaders.compute("passes/low_resolution_pack.comp", defines)
-        self._scatter = shaders.compute("passes/low_resolution_scatter.comp", {**defines, **picked_units})
+        defines = {**DEFINES, "FACTOR": factor}
+        self._pick = {
+            shrinks: FullscreenPass(
+                context, shaders, "passes/low_resolution_pick.frag", {**defines, "SHRINKS": shrinks}
+            )
+            for shrinks in (False, True)
+        }
+        self._blend = FullscreenPass(context, shaders, "passes/low_resolution_blend.frag", defines)
+        self._count = shaders.compute("passes/low_resolution_count.comp", defines)
+        self._make_list = shaders.compute("passes/low_resolution_list.comp", defines)
+        self._scatter = shaders.compute("passes/low_resolution_scatter.comp", defines)
 
     def render(self, gbuffer: GBuffer, view: View, gather: Gather) -> moderngl.Texture:
         """What `gather` finds, for each pixel of `gbuffer`; RGBA32F, 0 where no surface shows.
@@ -188,7 +198,6 @@ class LowResolutionGather:
         """
         if self._everything:
             return gather(PickedPixels(gbuffer, self._all_pixels()))
-        self._result.clear()
         small = self._shrunk(gbuffer)
         low = gather(small.picked)
         if self._keep_low:
@@ -211,7 +220,7 @@ class LowResolutionGather:
         if self._everything:
             return {"discontinuity": np.ones((height, width, 1), np.float32)}
         marks = np.frombuffer(self._marks.read(alignment=1), np.uint8).reshape(height, width, 1)[::-1]
-        found = {"discontinuity": marks.astype(np.float32)}
+        found = {"discontinuity": (marks == REDONE).astype(np.float32)}
         if self._low is not None:
             factor = self._settings.low_resolution
             # Rows were counted from the bottom, where the first texel is.
@@ -229,33 +238,31 @@ class LowResolutionGather:
 
     def _shrunk(self, gbuffer: GBuffer) -> _PickedTextures:
         gbuffer.bind()
-        self._small.bind()
-        self._shrink.run(*self._small.groups)
-        self._context.memory_barrier()
+        self._pick[True].draw(self._small.framebuffer)
         return self._small
 
     def _blended(self, gbuffer: GBuffer, view: View, small: _PickedTextures, low: moderngl.Texture) -> None:
-        """Fills in what the low resolution does for, marks the rest and counts it group by group."""
+        """Fills in what the low resolution does for and marks the rest."""
         gbuffer.bind()
         picked = small.picked.gbuffer
         for unit, texture in enumerate((picked.position, picked.shading_normal, low), FIRST_UNIT):
             texture.use(unit)
-        self._result.texture.bind_to_image(0, read=False, write=True)
-        self._marks.bind_to_image(1, read=False, write=True)
-        self._counts.bind_to_storage_buffer(COUNT_BINDING)
-        self._shown.orphan()
-        self._shown.write(bytes(4))
-        self._shown.bind_to_storage_buffer(SHOWN_BINDING)
         at_0, per_depth = view.picture_width(self._size[0])
         settings = self._settings
         uniforms = {"normal_threshold": settings.normal_threshold, "position_threshold": settings.position_threshold}
         uniforms["value_threshold"] = settings.value_threshold
-        set_uniforms(self._blend, {**uniforms, "width_at_0": at_0, "width_per_depth": per_depth})
-        self._blend.run(*self._groups)
-        self._context.memory_barrier()
+        set_uniforms(self._blend.program, {**uniforms, "width_at_0": at_0, "width_per_depth": per_depth})
+        self._blend.draw(self._filled)
 
     def _counted(self) -> int:
-        """How many pixels are marked; leaves for each group how many are in the groups before it."""
+        """How many pixels are to be gathered again; leaves for each group how many are in the groups before it."""
+        self._marks.use(FIRST_UNIT)
+        self._counts.bind_to_storage_buffer(COUNT_BINDING)
+        self._shown.orphan()
+        self._shown.write(bytes(4))
+        self._shown.bind_to_storage_buffer(SHOWN_BINDING)
+        self._count.run(*self._groups)
+        self._context.memory_barrier()
         self._prefix_sum.run(self._counts, self._counts.size // 4)
         count = int(np.frombuffer(self._counts.read(), np.uint32)[-1])
         self.redone += count
@@ -269,13 +276,14 @@ class LowResolutionGather:
         if rows not in self._packed:
             self._packed[rows] = _PickedTextures(self._context, GROUP_SIDE * columns, GROUP_SIDE * rows)
         packed = self._packed[rows]
-        packed.clear()
-        gbuffer.bind()
-        packed.bind()
-        self._marks.bind_to_image(MARK_IMAGE, read=True, write=False)
+        self._marks.use(FIRST_UNIT)
         self._counts.bind_to_storage_buffer(COUNT_BINDING)
-        self._pack.run(*self._groups)
+        self._list.bind_to_storage_buffer(LIST_BINDING)
+        self._make_list.run(*self._groups)
         self._context.memory_barrier()
+        gbuffer.bind()
+        set_uniforms(self._pick[False].program, {"count": count})
+        self._pick[False].draw(packed.framebuffer)
         return packed
 
     def _scattered(self, packed: _PickedTextures, count: int, found: moderngl.Texture) -> None:

@@ -1,26 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fills in the pixels that look like their neighbours in the low-resolution G-buffer (seed 001, 3.5) where these have
-// much the same result, and marks and counts the others, one count a group.
+// much the same result, and marks the others.
 #include "passes/gbuffer_samplers.glsl"
 
 #define LARGE 3e38
 
-layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
-
 layout(binding = LOW_POSITION_UNIT) uniform sampler2D low_position;
 layout(binding = LOW_NORMAL_UNIT) uniform sampler2D low_normal;
 layout(binding = LOW_RESULT_UNIT) uniform sampler2D low_result;
-layout(rgba32f, binding = 0) writeonly uniform image2D result;
-layout(r8ui, binding = 1) writeonly uniform uimage2D is_redone;
-layout(std430, binding = COUNT_BINDING) writeonly buffer Counts { uint counts[]; };
-layout(std430, binding = SHOWN_BINDING) buffer Shown { uint shown; };
+layout(location = 0) out vec4 out_result;
+layout(location = 1) out uint out_mark;
 
 uniform float normal_threshold;     // length of the difference of unit normals
 uniform float position_threshold;   // share of the picture's width
 uniform float value_threshold;      // share of the largest result around a pixel
 uniform float width_at_0, width_per_depth; // of the picture, m: width_at_0 + width_per_depth x depth
-
-shared uint group_shown, group_redone;
 
 // Where `pixel` lies between the two texels `low` and `low` + 1 of the low-resolution picture along one axis.
 float share_between(int pixel, int low, int last) {
@@ -28,8 +22,9 @@ float share_between(int pixel, int low, int last) {
     return to > from ? float(pixel - from) / float(to - from) : 0.0;
 }
 
-// Whether the pixel was filled in. pixel: shows a surface.
-bool blend(ivec2 pixel) {
+// Whether the pixel can be filled in, and with what. pixel: shows a surface.
+bool blend(ivec2 pixel, out vec4 result) {
+    result = vec4(0.0);
     ivec2 last = textureSize(gbuffer_position, 0) - 1;
     ivec2 low_last = textureSize(low_position, 0) - 1;
     ivec2 low = pixel / FACTOR;
@@ -64,26 +59,15 @@ bool blend(ivec2 pixel) {
     if (total == 0.0 || max(max(range.r, range.g), range.b) > value_threshold * largest) {
         return false;
     }
-    imageStore(result, pixel, sum / total);
+    result = sum / total;
     return true;
 }
 
 void main() {
-    if (gl_LocalInvocationIndex == 0u) {
-        group_shown = group_redone = 0u;
-    }
-    barrier();
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (all(lessThan(pixel, imageSize(result)))) {
-        bool shows = pixel_shows_geometry(pixel);
-        bool redo = shows && !blend(pixel);
-        imageStore(is_redone, pixel, uvec4(redo ? 1u : 0u));
-        atomicAdd(group_shown, shows ? 1u : 0u);
-        atomicAdd(group_redone, redo ? 1u : 0u);
-    }
-    barrier();
-    if (gl_LocalInvocationIndex == 0u) {
-        counts[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x] = group_redone;
-        atomicAdd(shown, group_shown);
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    out_result = vec4(0.0);
+    out_mark = MARK_EMPTY;
+    if (pixel_shows_geometry(pixel)) {
+        out_mark = blend(pixel, out_result) ? MARK_FILLED : MARK_REDONE;
     }
 }
