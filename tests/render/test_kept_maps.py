@@ -144,6 +144,8 @@ def test_another_resolution_or_number_of_maps_draws_again(used: Device) -> None:
     assert drawn(rendered(used, hall(lights=(lamp,)), area_maps=2, resolution=64)) == 2
     assert drawn(rendered(used, hall(lights=(lamp,)), area_maps=3, resolution=64)) == 3
     assert drawn(rendered(used, hall(lights=(lamp,)), area_maps=3, resolution=64)) == 0
+    assert drawn(rendered(used, hall(), area_maps=3)) == 2
+    assert drawn(rendered(used, hall(), area_maps=4)) == 0
 
 
 def test_lamps_switched_off_and_on_leave_nothing_behind(used: Device) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from ..fullscreen import FullscreenPass
 from ..geometry import GpuGeometry
 from ..gpu_layout import CONSTANTS, LAMP
 from ..kept import Kept
+from ..kept_maps import KeptMaps, map_bytes
 from ..lamp_records import lamp_record
 from ..lamp_scenes import LampScene, LampScenes
 from ..local_space import LocalSpace
@@ -33,8 +34,6 @@ LEAST_FACE = 8
 MIP_GROUP_SIDE = 8
 CACHE_BYTES = 1 << 29
 """Of maps that are kept; those beyond are drawn for each picture."""
-BYTES_PER_TEXEL = 54
-"""Three images of 16 bytes, a third more for the mip levels of one."""
 CHANNELS = 3
 
 
@@ -211,47 +210,6 @@ class ReflectiveShadowMapPass:
             self._context.memory_barrier()
 
 
-class KeptMaps:
-    """Maps that a device keeps over frames, by what they depend on."""
-
-    def __init__(self) -> None:
-        self._maps: dict[str, ReflectiveShadowMap] = {}
-        self._spare: dict[tuple[int, int], list[MapTextures]] = {}
-
-    def keep_only(self, keys: Collection[str]) -> None:
-        """Lets go of all other maps; their textures are drawn into again until `drop_spare`."""
-        for key in [key for key in self._maps if key not in keys]:
-            textures = self._maps.pop(key).textures
-            self._spare.setdefault(textures.flux.size, []).append(textures)
-
-    def drop_spare(self) -> None:
-        """Lets go of the textures of maps that are no longer kept."""
-        self._spare.clear()
-
-    def spare(self, size: tuple[int, int]) -> MapTextures | None:
-        """Textures of that size whose map is no longer kept, if there are any."""
-        found = self._spare.get(size)
-        return found.pop() if found else None
-
-    def get(self, key: str) -> ReflectiveShadowMap | None:
-        """The map of that key, if it is kept."""
-        return self._maps.get(key)
-
-    def add(self, key: str, found: ReflectiveShadowMap) -> None:
-        """Keeps a map."""
-        self._maps[key] = found
-
-    @property
-    def nbytes(self) -> int:
-        """Of all maps, on the device."""
-        return sum(map_bytes(found.flux.size) for found in self._maps.values())
-
-
-def map_bytes(size: tuple[int, int]) -> int:
-    """Of one map of so many texels, on the device."""
-    return size[0] * size[1] * BYTES_PER_TEXEL
-
-
 @dataclass(frozen=True)
 class _Source:
     """One map of a lamp. key: of all that it depends on."""
@@ -284,8 +242,9 @@ class LampReflections:
         for light in snapshot.lights:
             if max(light.power) > 0.0:
                 scene = self._scenes.of(light)
-                for sample in range(len(map_points(light, area_maps))):
-                    key = content_hash([scene.lamp_key, self._pass.face, sample, area_maps])
+                count = len(map_points(light, area_maps))
+                for sample in range(count):
+                    key = content_hash([scene.lamp_key, self._pass.face, sample, count])
                     self._sources.append(_Source(scene, sample, key))
         self._maps: KeptMaps = kept.get("reflective_maps", "", KeptMaps)
         self._maps.keep_only({source.key for source in self._sources})
