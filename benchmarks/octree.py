@@ -5,6 +5,8 @@
 shaders get of each triangle; `build ms`: upload, voxels and octree. Both are the best of three runs to the end of all
 work; `threads ms`: the same build in the time of all threads, which means the same on a busy machine (on a GPU it means
 nothing). Rays go between random points of the surface that face each other, from where lib/octree.glsl lifts them.
+`wrongly dark`, `wrongly
+lit`: shares of EXACT_RAYS of those pairs where Blender's own rays between the triangles say otherwise.
 `document MB`: 16 bytes for each of eight children of every node down to the voxels (seed 004, 3.1), for the same
 voxels.
 """
@@ -32,6 +34,9 @@ from vlm_addon.terminal import table
 
 RAYS_SHADER = "../benchmarks/octree_rays.comp"
 _BINDINGS = {"PAIR_BINDING": 0, "RESULT_BINDING": 1, "OCTREE_BINDING": 2}
+EXACT_RAYS = 10_000
+# Of the length of a way: what is left out at both of its ends, which lie on triangles.
+ENDS = 1e-4
 SCENES, RESOLUTIONS, RAYS = ("cornell_box", "atrium"), (64, 128, 256), 200_000
 REPEATS = 3
 # Random points that are tried for one pair that faces each other.
@@ -58,6 +63,8 @@ HEADER = (
     "rays seen",
     "Mrays/s",
     "Mrays/s a thread",
+    "wrongly dark",
+    "wrongly lit",
 )
 
 
@@ -84,7 +91,10 @@ def row(device: Device, scene: str, snapshot: SceneSnapshot, resolution: int, ra
     places, numpy_ms, _ = best(device, lambda: corners(snapshot, frame))
     tree, build_ms, threads_ms = best(device, lambda: builder.build(places, frame.depth, target))
     voxels = tree.read()
-    seen, ray_ms, ray_threads_ms = best(device, rays_of(device, tree, facing_pairs(snapshot, frame, rays)))
+    pairs = facing_pairs(snapshot, frame, rays)
+    seen, ray_ms, ray_threads_ms = best(device, rays_of(device, tree, pairs))
+    exact = exactly_seen(places, pairs[:EXACT_RAYS])
+    shown = seen[:EXACT_RAYS]
     document = DOCUMENT_MS.get((scene, resolution))
     return (
         scene,
@@ -103,6 +113,8 @@ def row(device: Device, scene: str, snapshot: SceneSnapshot, resolution: int, ra
         f"{seen.mean():.0%}",
         f"{1e-3 * len(seen) / ray_ms:.3g}",
         f"{1e-3 * len(seen) / ray_threads_ms:.3g}",
+        f"{(exact & ~shown).mean():.2%}",
+        f"{(~exact & shown).mean():.2%}",
     )
 
 
@@ -153,6 +165,20 @@ def rays_of(device: Device, tree: GpuTree, pairs: Float32) -> Callable[[], np.nd
         return np.frombuffer(results.read(), np.uint32) > 0
 
     return ask
+
+
+def exactly_seen(places: Float64, pairs: Float32) -> np.ndarray:
+    """(p,) bool: whether no triangle is between the points of each pair."""
+    # There as soon as Blender has opened a file.
+    from mathutils import Vector
+    from mathutils.bvhtree import BVHTree
+
+    tree = BVHTree.FromPolygons(places.reshape(-1, 3).tolist(), np.arange(3 * len(places)).reshape(-1, 3).tolist())
+    result = np.zeros(len(pairs), bool)
+    for row, pair in enumerate(pairs.astype(float)):
+        start, way = Vector(pair[0, :3]), Vector(pair[2, :3] - pair[0, :3])
+        result[row] = tree.ray_cast(start + ENDS * way, way, (1.0 - 2.0 * ENDS) * way.length)[0] is None
+    return result
 
 
 def document_bytes(tree: VoxelOctree) -> int:

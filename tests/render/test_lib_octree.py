@@ -80,6 +80,21 @@ def test_octree_box_and_octree_outside(device, tree, part):
     assert occupied.any()
 
 
+def test_octree_occupied_in_either_tree(device):
+    places = np.random.default_rng(10).uniform(-2.0, SIZE + 2.0, (3000, 3)).astype(np.float32)
+    with device.current() as context:
+        builder = VoxelizePass(context, device.shaders)
+        shapes = sphere(DEPTH, rings=10), box((3.0, 3.0, 20.0), (28.0, 28.0, 21.0))
+        trees = [builder.build(shape, DEPTH, GrowingBuffer(context, "octree")) for shape in shapes]
+        joined = builder.join(trees, GrowingBuffer(context, "octree"))
+        each = [boxes_at(tree.read(), cells_at(places)).occupied for tree in trees]
+    bind(device, joined)
+    found = ask(device, "float(octree_occupied(p))", {"p": places}) > 0.5
+    assert np.array_equal(found, each[0] | each[1])
+    assert (each[0] & ~each[1]).any()
+    assert (each[1] & ~each[0]).any()
+
+
 def test_octree_tree_clear_is_the_walk_of_core(device, tree):
     starts, ends = segments(4000, np.random.default_rng(5))
     found = ask(device, "float(octree_tree_clear(0u, a, b))", {"a": starts, "b": ends}) > 0.5
