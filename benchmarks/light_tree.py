@@ -5,8 +5,7 @@
 surface, under smooth radiosity and under two spot lamps that light a patch each. `evaluated` counts form factors and
 cluster formulas computed for a point, `visited` all lights and clusters met on the way, most of which turn out to face
 away, to lie under the horizon or to be dark. Milliseconds are those of the processor, the least of three times; what
-is measured is what renderers do: `build` is the tree and the factor of its windows, `relight` the scale and the
-clusters.
+is measured is what renderers do: `build` is the tree, `relight` the scale, the factor of the windows and the clusters.
 """
 
 from __future__ import annotations
@@ -123,13 +122,12 @@ def rows(
     channels = np.zeros((len(light_mesh), 3))
     channels[:, : len(lightings)] = np.stack(list(lightings.values()), axis=1)
     full = full_irradiance(light_mesh, channels, at.positions, at.normals, tags)
-    tree, tree_ms = best(lambda: build_light_tree(light_mesh))
-    factors = {t: best(partial(window_factor, [tree], light_mesh, t, probes)) for t in tolerances}
+    tree, build_ms = best(lambda: build_light_tree(light_mesh))
     for channel, (name, values) in enumerate(lightings.items()):
         radiosity = np.column_stack([values, np.zeros((len(values), 2))])
         for tolerance in tolerances:
-            factor, factor_ms = factors[tolerance]
-            clusters, relight_ms = best(partial(relit, tree, light_mesh, radiosity, tolerance, factor, probes))
+            relight = partial(relit, tree, light_mesh, radiosity, tolerance, probes)
+            (clusters, factor), relight_ms = best(relight)
             cut = cut_irradiance(tree, clusters, light_mesh, radiosity, at.positions, at.normals, tags)
             errors = point_error(cut.irradiance[:, 0], full[:, channel])
             yield Row(
@@ -140,7 +138,7 @@ def rows(
                 errors=PointErrors(errors, float(cut.evaluated.mean()), float(cut.visited.mean())),
                 most_evaluated=int(cut.evaluated.max()),
                 factor=factor,
-                build_ms=tree_ms + factor_ms,
+                build_ms=build_ms,
                 relight_ms=relight_ms,
                 nbytes=tree.nbytes + clusters.nbytes,
             )
@@ -151,12 +149,12 @@ def relit(
     light_mesh: VirtualLightMesh,
     radiosity: Float64,
     tolerance: float,
-    factor: float,
     probes: SurfacePoints,
-) -> LightClusters:
-    """As renderers relight."""
+) -> tuple[LightClusters, float]:
+    """As renderers relight; and the factor of the windows."""
     mean = mean_irradiance([tree], light_mesh, radiosity, probes)
-    return light_clusters(tree, light_mesh, radiosity, tolerance, mean, factor)
+    factor = window_factor([tree], light_mesh, radiosity, tolerance, mean, probes)
+    return light_clusters(tree, light_mesh, radiosity, tolerance, mean, factor), factor
 
 
 def best(work: Callable[[], T]) -> tuple[T, float]:

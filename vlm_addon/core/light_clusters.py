@@ -35,9 +35,9 @@ SOFTNESS = math.sqrt(3.0)
 # Error of a cluster at a distance d, as a share of power / (pi d²), found on the atrium under smooth light and under
 # lamps that light from 20 to some hundreds of 100,000 lights (tests/core/test_light_cut_accuracy.py):
 # _SIZE_ERROR (radius / d)^4, because four points have the lights' mean and spread but not their shape;
-_SIZE_ERROR = 0.07
+_SIZE_ERROR = 0.06
 # _NORMAL_ERROR sqrt(1 - flux / power), because normals are not spread evenly;
-_NORMAL_ERROR = 0.42
+_NORMAL_ERROR = 0.34
 # _HORIZON_ERROR spread / d, which happens where a horizon cuts through: seldom, so not added to the others.
 _HORIZON_ERROR = 0.1
 # The clusters of a plain wall err alike, by _COMMON_ERROR (radius / d)^4 of what they give: at most the tolerance.

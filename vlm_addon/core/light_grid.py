@@ -144,14 +144,7 @@ class LightGrid:
             kept = hashes[-1] == old_hash
             made.append(_unlit(structure) if kept else self._built(light_mesh, chosen, progress))
         grid = replace(self, light_count=len(light_mesh), static_hash=hashes[0], dynamic_hash=hashes[1])
-        if not (made[0] is not None and hashes[0] == old[0][1]):
-            grid = replace(grid, window_factor=grid._window_factor(made, light_mesh))
         return grid._lit(made, light_mesh, light_mesh.nominal_radiosity)
-
-    def _window_factor(self, parts: list[Structure | None], light_mesh: VirtualLightMesh) -> float:
-        """Of what stands still, so that what moves does not change it; where all moves, of that."""
-        trees = [part for part in parts if isinstance(part, LightTree)]
-        return window_factor(trees[:1], light_mesh, self.settings.tolerance, self.probes)
 
     def _built(self, light_mesh: VirtualLightMesh, chosen: Bools, progress: Progress) -> Structure | None:
         if not chosen.any():
@@ -179,13 +172,14 @@ class LightGrid:
         trees = [part for part in parts if isinstance(part, LightTree)]
         mean = mean_irradiance(trees, light_mesh, radiosity, self.probes)
         tolerance = self.settings.tolerance
+        factor = window_factor(trees, light_mesh, radiosity, tolerance, mean, self.probes)
         static, dynamic = (
-            LitTree(part, light_clusters(part, light_mesh, radiosity, tolerance, mean, self.window_factor))
+            LitTree(part, light_clusters(part, light_mesh, radiosity, tolerance, mean, factor))
             if isinstance(part, LightTree)
             else part
             for part in parts
         )
-        return replace(self, static=static, dynamic=dynamic)
+        return replace(self, window_factor=factor, static=static, dynamic=dynamic)
 
     @property
     def structures(self) -> list[tuple[str, RangeGrid | LitTree]]:

@@ -20,10 +20,6 @@ class SurfacePoints:
     normals: Float64
     tag_ids: Int32
 
-    def rows(self, chosen: slice) -> SurfacePoints:
-        """Those of the chosen rows."""
-        return SurfacePoints(self.positions[chosen], self.normals[chosen], self.tag_ids[chosen])
-
 
 NO_POINTS = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int32))
 

@@ -9,13 +9,13 @@ times as large), so windows of twice the size tell the errors of others without 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
 from .light_clusters import light_clusters
 from .light_cut import cut_irradiance
 from .light_mesh import VirtualLightMesh
-from .light_scale import mean_irradiance
 from .light_tree import LightTree
 from .metrics import point_error, within_tolerance
 from .scene import Float64
@@ -24,72 +24,44 @@ from .surface_points import SurfacePoints
 # Windows are compared with those that are so many steps larger.
 _STEPS_TO_DOUBLE = 2
 _STEPS = 6
-# Of the tolerance: what errors are asked to stay within, as the probes are few and those of the double window count.
-_SHARE = 0.75
-# No wall of a building faces it squarely.
-_SUN = np.array([0.48, 0.6, 0.64])
+# Of the tolerance: what errors are asked to stay within, since probes are few and larger windows err as well.
+_SHARE = 0.6
 
 
 def window_factor(
-    trees: Sequence[LightTree], light_mesh: VirtualLightMesh, tolerance: float, probes: SurfacePoints
+    trees: Sequence[LightTree],
+    light_mesh: VirtualLightMesh,
+    radiosity: Float64,
+    tolerance: float,
+    mean_irradiance: float,
+    probes: SurfacePoints,
 ) -> float:
     """At least 1 and at most 8, in steps of sqrt(2): what windows are to be multiplied by; 1 without probes.
 
-    Found under two lights that are the same whatever lamps do, so that relighting keeps it: even light at every other
-    probe, a sun that shines through walls at the others.
+    trees: that together hold all lights. radiosity: (n, 3) W/m². mean_irradiance: as `light_clusters`. Each channel
+    counts for itself, since a cluster sends out one mean colour.
     """
-    if not trees or len(probes.positions) < 2:
+    if not trees or not len(probes.positions):
         return 1.0
-    judged = np.zeros(len(light_mesh), bool)
-    judged[np.concatenate([tree.light_order for tree in trees])] = True
-    even = np.where(judged[:, None], light_mesh.nominal_radiosity, 0.0)
-    facing = light_mesh.area_vectors @ _SUN
-    sizes = np.maximum(np.linalg.norm(light_mesh.area_vectors, axis=1), np.finfo(float).tiny)
-    sunlit = even * np.maximum(facing / sizes, 0.0)[:, None]
-    lights = [
-        _Windows(trees, light_mesh, radiosity, tolerance, probes.rows(slice(start, None, 2)))
-        for start, radiosity in enumerate((even, sunlit))
-    ]
-    step = 0
-    while step < _STEPS and not all(light.holds(step) for light in lights):
-        step += 1
-    return _factor(step)
+
+    @cache
+    def irradiance(step: int) -> Float64:
+        """(p, 3) W/m²."""
+        total = np.zeros((len(probes.positions), 3))
+        for tree in trees:
+            clusters = light_clusters(tree, light_mesh, radiosity, tolerance, mean_irradiance, _factor(step))
+            cut = cut_irradiance(
+                tree, clusters, light_mesh, radiosity, probes.positions, probes.normals, probes.tag_ids
+            )
+            total += cut.irradiance
+        return total
+
+    def holds(step: int) -> bool:
+        errors = point_error(irradiance(step), irradiance(step + _STEPS_TO_DOUBLE))
+        return within_tolerance(errors, _SHARE * tolerance)
+
+    return _factor(next((step for step in range(_STEPS) if holds(step)), _STEPS))
 
 
 def _factor(step: int) -> float:
     return float(2.0 ** (step / _STEPS_TO_DOUBLE))
-
-
-class _Windows:
-    """Irradiance of probes under one light, by the size of the windows."""
-
-    def __init__(
-        self,
-        trees: Sequence[LightTree],
-        light_mesh: VirtualLightMesh,
-        radiosity: Float64,
-        tolerance: float,
-        probes: SurfacePoints,
-    ) -> None:
-        self._inputs = light_mesh, radiosity
-        self._trees, self._tolerance, self._probes = trees, tolerance, probes
-        self._mean = mean_irradiance(trees, light_mesh, radiosity, probes)
-        self._found: dict[int, Float64] = {}
-
-    def holds(self, step: int) -> bool:
-        """Whether windows of this step keep the tolerance."""
-        errors = point_error(self._irradiance(step), self._irradiance(step + _STEPS_TO_DOUBLE))
-        return within_tolerance(errors, _SHARE * self._tolerance)
-
-    def _irradiance(self, step: int) -> Float64:
-        """(p,) W/m², sum over the channels."""
-        if step not in self._found:
-            total = np.zeros(len(self._probes.positions))
-            for tree in self._trees:
-                clusters = light_clusters(tree, *self._inputs, self._tolerance, self._mean, _factor(step))
-                cut = cut_irradiance(
-                    tree, clusters, *self._inputs, self._probes.positions, self._probes.normals, self._probes.tag_ids
-                )
-                total += cut.irradiance.sum(axis=1)
-            self._found[step] = total
-        return self._found[step]

@@ -62,10 +62,12 @@ class LightStructures:
                 shapes[kind] = lights_hash(light_mesh, chosen, TOLERANCE)
                 build = partial(build_light_tree, light_mesh, chosen)
                 trees[kind] = self._kept.get(f"{kind}_tree", shapes[kind], build)
-        factor = self._window_factor(snapshot, light_mesh, trees, shapes, tolerance)
         probes = random_surface_points(snapshot.meshes, PROBES)
         state = content_hash([*shapes.values(), radiosity, probes.positions, probes.normals, probes.tag_ids])
-        mean = self._kept.get("scale", state, lambda: mean_irradiance(list(trees.values()), light_mesh, values, probes))
+        inputs = list(trees.values()), light_mesh, values
+        mean = self._kept.get("scale", state, lambda: mean_irradiance(*inputs, probes))
+        judge = partial(window_factor, *inputs, tolerance, mean, probes)
+        factor = self._kept.get("window_factor", content_hash([state, tolerance]), judge)
         result = []
         for kind, tree in trees.items():
 
@@ -75,22 +77,6 @@ class LightStructures:
             state = content_hash([shapes[kind], radiosity[chosen_lights(light_mesh)[kind]], tolerance, mean, factor])
             result.append(self._kept.get(f"{kind}_clusters", state, relight))
         return result, factor
-
-    def _window_factor(
-        self,
-        snapshot: SceneSnapshot,
-        light_mesh: VirtualLightMesh,
-        trees: dict[str, LightTree],
-        shapes: dict[str, str],
-        tolerance: float,
-    ) -> float:
-        """Of what stands still, so that what moves does not change it; where all lights move, of those."""
-        judged = STATIC if STATIC in trees else next(iter(trees), STATIC)
-        probes = random_surface_points(_static(snapshot).meshes, PROBES)
-        even = light_mesh.nominal_radiosity[chosen_lights(light_mesh)[judged]]
-        state = content_hash([shapes.get(judged), even, tolerance, probes.positions, probes.normals, probes.tag_ids])
-        judge = partial(window_factor, [trees[judged]] if trees else [], light_mesh, tolerance, probes)
-        return self._kept.get("window_factor", state, judge)
 
     def range_grids(
         self,
