@@ -49,7 +49,7 @@ def soup(count: int) -> np.ndarray:
 
 
 def pavilion() -> tuple[np.ndarray, np.ndarray]:
-    """A hall that is open at one end, with a finely cut box in it; and radiosities: only what faces the open end is lit.
+    """A hall, open at one end, with a finely cut box in it; and radiosities: what faces the open end is lit.
 
     The box's face and the wall far behind it are in one cluster.
     """
