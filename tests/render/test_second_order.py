@@ -326,6 +326,18 @@ def test_low_resolution_is_right_to_half_a_percent_where_7_of_8_pixels_are(
     assert mask.mean() == pytest.approx(1.0 - low.counters["low_resolution_share"], abs=0.01)
 
 
+def test_a_scene_without_surfaces_has_no_lights(device: Device) -> None:
+    frame = rendered(device, replace(empty_room([MIDDLE]), meshes=()))
+    assert not frame.images["combined"][..., :3].any()
+    assert frame.counters["indirect_lights"] == frame.counters["low_resolution_share"] == 0
+
+
+def test_lamps_that_cast_no_shadow_are_named(device: Device) -> None:
+    frame = rendered(device, empty_room([replace(MIDDLE, name="Ghost", casts_shadow=False), LAMPS["spot"]]))
+    assert len(frame.reasons) == 1
+    assert "Ghost" in frame.reasons[0]
+
+
 def test_lights_are_marked_in_the_picture_where_they_are(device: Device) -> None:
     frame = rendered(device, box_room(), 1, 64, indirect_lights=40, negative_lights=0)
     marks = frame.images["second_order_lights"]

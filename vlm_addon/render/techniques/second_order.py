@@ -233,6 +233,11 @@ class SecondOrder(Technique):
         kept, taken = float(image[..., :3].mean(axis=2).sum()), float(image[..., 3].sum())
         return taken / (kept + taken) if taken > 0.0 else 0.0
 
+    def reasons(self) -> list[str]:
+        """Which lamps' light does not bounce as they shine."""
+        names = [light.name for light in self.scene.snapshot.lights if not light.casts_shadow]
+        return [f"{', '.join(names)}: no shadow, yet the light bounces off the nearest surfaces only"] if names else []
+
     def images(self) -> dict[str, Float32]:
         """Irradiance from either kind of light at full resolution, where the low resolution did not do, what was found
         at low resolution, and the lights in the picture: white, negative ones blue."""
