@@ -11,6 +11,7 @@ A software renderer's frames per second are what its processor time would make i
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import time
 from collections.abc import Sequence
@@ -56,8 +57,9 @@ class Measured(NamedTuple):
 class Bench:
     """Measures each combination of room, technique, settings and size once."""
 
-    def __init__(self, device: Device, divisor: int) -> None:
+    def __init__(self, device: Device, divisor: int, with_cycles: bool) -> None:
         self._device = device
+        self._with_cycles = with_cycles
         self._divisor = divisor
         self._found: dict[str, Measured] = {}
         self.rooms: set[int] = set()
@@ -78,9 +80,14 @@ class Bench:
         moved_scene = replace(scene, lights=(replace(lamp, position=(x + LAMP_STEP_M, y, z)),))
         # Compiles the shaders.
         self._render(scene, row)
-        _, moved = self._render(moved_scene, row)
-        self._render(scene, row)
         still = [self._render(scene, row) for _ in range(STILL_FRAMES)]
+        _, moved = self._render(moved_scene, row)
+        error, like_cycles = self._against_cycles(scene, row) if self._with_cycles else (math.nan, math.nan)
+        picture = srgb_from_linear(still[0][0].images["combined"])
+        return Measured(1.0 / min(seconds for _, seconds in still), 1.0 / moved, picture, error, like_cycles)
+
+    def _against_cycles(self, scene: SceneSnapshot, row: Row) -> tuple[float, float]:
+        """Indirect error and similarity of the whole picture."""
         truth = reference(row.pots)
         share = row.size[0] / FULL[0]
         size = (round(share * REFERENCE_SIZE[0]), round(share * REFERENCE_SIZE[1]))
@@ -88,10 +95,7 @@ class Bench:
         frame = self._device.render(scene, None, settings)
         indirect = stretched(frame.images["indirect"], REFERENCE_SIZE)
         displayed = srgb_from_linear(stretched(frame.images["combined"], REFERENCE_SIZE))
-        return Measured(
-            1.0 / min(seconds for _, seconds in still),
-            1.0 / moved,
-            srgb_from_linear(still[0][0].images["combined"]),
+        return (
             relative_rmse(indirect, truth.images["indirect"]),
             similarity(displayed, srgb_from_linear(truth.images["combined"])),
         )
@@ -145,8 +149,8 @@ def cells(bench: Bench, row: Row) -> tuple[str, ...]:
         said(row.similar, ".2f", "%"),
         "" if similar == 1.0 else f"{rank:.3f}",
         said(row.rank, ".2f"),
-        f"{found.error:.1%}",
-        f"{found.like_cycles:.1%}",
+        "" if math.isnan(found.error) else f"{found.error:.1%}",
+        "" if math.isnan(found.error) else f"{found.like_cycles:.1%}",
     )
 
 
@@ -161,16 +165,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("tables", nargs="*", help="numbers, such as 5.9")
     parser.add_argument("--divide", type=int, default=SHORT_DIVISOR, help="sides of pictures by this")
     parser.add_argument("--long", action="store_true", help="the seed's sizes: minutes to hours without a GPU")
+    parser.add_argument("--no-cycles", action="store_true", help="leave out what is measured against Cycles")
     given = parser.parse_args(arguments)
     divisor = 1 if given.long else given.divide
     with Device() as device:
         clock = "processor time over all processors" if device.is_software else "wall clock"
         print(f"{device.name}; sizes are the seed's divided by {divisor}; frames per second by {clock}")
-        bench = Bench(device, divisor)
+        bench = Bench(device, divisor, not given.no_cycles)
         for name, rows in TABLES.items():
             if not given.tables or set(given.tables) & set(name.partition(":")[0].split(" and ")):
                 print(f"\n{name}\n{table(HEADER, [cells(bench, row) for row in rows])}", flush=True)
-    for pots in sorted(bench.rooms):
+    for pots in () if given.no_cycles else sorted(bench.rooms):
         noise = reference(pots).noise
         print(f"noise of the reference, {pots} pots: {noise['indirect']:.1%}, whole picture {noise['combined']:.1%}")
 
