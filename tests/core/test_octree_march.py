@@ -62,7 +62,7 @@ def test_a_way_is_clear_where_it_meets_no_occupied_voxel(kind):
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 def test_no_way_leads_through_a_closed_surface(kind):
     rng = np.random.default_rng(3)
-    ball = sphere(6)
+    ball = sphere(6, rings=12)
     tree = build_octree(ball, 6)
     starts, ends = (ends.astype(kind) for ends in random_segments(10_000, 64.0, rng))
     crossing = convex_crossing(starts.astype(float), ends.astype(float), ball)
@@ -73,7 +73,7 @@ def test_no_way_leads_through_a_closed_surface(kind):
 def test_the_order_of_the_faces_may_be_any():
     """With fractions off by a tenth of a voxel and more a way still does not lead through a closed surface."""
     rng = np.random.default_rng(4)
-    ball = sphere(5)
+    ball = sphere(5, rings=8)
     tree = build_octree(ball, 5)
     starts, ends = random_segments(4000, 32.0, rng)
     crossing = convex_crossing(starts, ends, ball)

@@ -176,7 +176,7 @@ def leaks_and_false_shadows(device, depth, count):
     """A convex ball: crossings by cutting segments with its planes, distances between the spheres in and around it."""
     size = float(1 << depth)
     rng = np.random.default_rng(depth)
-    ball = sphere(depth)
+    ball = sphere(depth, rings=12)
     centre, outer = np.array([0.5, 0.47, 0.53]) * size, 0.42 * size
     normals = np.cross(ball[:, 1] - ball[:, 0], ball[:, 2] - ball[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -266,7 +266,8 @@ def triangle_records(places: Float64, depth: int) -> Float32:
 def _starting_lists(places: Float64, depth: int, deepest: int) -> list[UInt32]:
     """(b, 2) blocks to begin with on levels 1 to `deepest`: the packed first cell and the triangle."""
     starting = starting_blocks(places, depth, deepest, growth_of(depth) + lattice_step(depth))
-    packed = (starting.cells << np.array([0, 10, 20])).sum(axis=1)
+    x, y, z = starting.cells.T
+    packed = x | y << 10 | z << 20
     order = np.argsort(starting.levels, kind="stable")
     ends = np.searchsorted(starting.levels[order], np.arange(1, deepest + 1), "right")
     blocks = np.stack([packed[order], order], axis=1).astype(np.uint32)
