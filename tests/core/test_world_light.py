@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -10,10 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vlm_addon.core.array_codec import flatten, unflatten
 from vlm_addon.core.environment import map_directions, map_solid_angles
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.lamps import lamp_irradiance
 from vlm_addon.core.scene import POINT, SUN, Environment, Light, SceneSnapshot
+from vlm_addon.core.scene_codec import snapshot_from_tree
 from vlm_addon.core.world_light import is_lit_by_world, merged_world_lights, world_lights
 
 BLACK = (0.0, 0.0, 0.0)
@@ -201,3 +204,15 @@ def test_a_broken_map_is_refused() -> None:
 def test_the_same_world_gives_the_same_lights() -> None:
     environment = Environment("e", sky(), TURN)
     assert world_lights((0.1, 0.2, 0.3), environment, 64) == world_lights((0.1, 0.2, 0.3), environment, 64)
+
+
+def test_a_world_survives_the_way_to_the_renderers_process() -> None:
+    environment = Environment("attic", sky(8, 16), TURN)
+    snapshot = SceneSnapshot("s", lights=world_lights((0.1, 0.2, 0.3), environment, 4), environment=environment)
+    tree, arrays = flatten(snapshot)
+    found = snapshot_from_tree(unflatten(json.loads(json.dumps(tree)), arrays))
+    assert found.lights == snapshot.lights
+    assert found.environment is not None
+    assert found.environment.name == "attic"
+    np.testing.assert_array_equal(found.environment.radiance, environment.radiance)
+    np.testing.assert_array_equal(found.environment.map_from_world, TURN)
