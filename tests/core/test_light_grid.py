@@ -17,6 +17,7 @@ from vlm_addon.core.light_mesh import empty_light_mesh
 from vlm_addon.core.light_tree_error import expected_error
 from vlm_addon.core.range_grid import RangeGrid, RangeSettings
 from vlm_addon.core.settings import from_mapping
+from vlm_addon.core.surface_points import SurfacePoints
 
 BOX = ((-2.0, -2.0, -1.0), (2.0, 3.0, 1.0))
 BY_RANGE = GridSettings(mode=RANGE, grid=6, range=3.0)
@@ -34,6 +35,9 @@ def moved(light_mesh):
     vertices = light_mesh.vertices.copy()
     vertices[light_mesh.triangles[light_mesh.dynamic]] += [0.25, 0.0, 0.0]
     return replace(light_mesh, vertices=vertices)
+
+
+LIGHTS = lights()
 
 
 def of_point(offsets, values, point):
@@ -318,6 +322,33 @@ def test_refuses_to_relight_with_another_number_of_lights(settings):
     grid = LightGrid.bake(lights(6), BOX, settings)
     with pytest.raises(InvalidInput, match="7 lights, the light grid was baked from 6"):
         grid.relit(lights(7), np.ones((7, 3)))
+
+
+def test_refuses_to_relight_with_other_lights():
+    other = replace(LIGHTS, vertices=LIGHTS.vertices + 0.1)
+    with pytest.raises(InvalidInput, match="other lights"):
+        LightGrid.bake(LIGHTS, BOX, WITHIN).relit(other, np.ones((len(other), 3)))
+
+
+@pytest.mark.parametrize(
+    ("probes", "says"),
+    [
+        (np.zeros((4, 3)), "type ndarray"),
+        (SurfacePoints(np.zeros((5, 2)), np.zeros((5, 3)), np.zeros(5, np.int32)), r"shape \(5, 2\)"),
+        (SurfacePoints(np.full((5, 3), np.nan), np.ones((5, 3)), np.zeros(5, np.int32)), "not finite"),
+    ],
+)
+def test_refuses_probes_it_cannot_use(probes, says):
+    with pytest.raises(InvalidInput, match=says):
+        LightGrid.bake(LIGHTS, BOX, WITHIN, probes=probes)
+
+
+@pytest.mark.parametrize("index", [-1, 10**6])
+def test_refuses_corners_that_are_no_vertices(index):
+    triangles = LIGHTS.triangles.copy()
+    triangles[2, 1] = index
+    with pytest.raises(InvalidInput, match="light 2"):
+        LightGrid.bake(replace(LIGHTS, triangles=triangles), BOX, WITHIN)
 
 
 @pytest.mark.parametrize("settings", [BY_RANGE, WITHIN])

@@ -29,7 +29,7 @@ from .progress import Progress, silent, step
 from .range_grid import RangeGrid, RangeSettings
 from .scene import Float64
 from .settings import setting
-from .surface_points import NO_POINTS, SurfacePoints
+from .surface_points import NO_POINTS, SurfacePoints, require_points
 from .window_factor import window_factor
 
 TOLERANCE, RANGE = "tolerance", "range"
@@ -124,13 +124,13 @@ class LightGrid:
         surface; `surface_points.random_surface_points` makes probes of a scene's meshes.
 
         In tolerance mode its clusters are lit by its nominal radiosity until `relit`. Raises InvalidInput for lights,
-        settings or bounds that cannot be used, Cancelled when `progress` says so.
+        settings, bounds or probes that cannot be used, Cancelled when `progress` says so.
         """
         settings = GridSettings() if settings is None else settings
         if not isinstance(settings, GridSettings):
             problem = f"they are of type {type(settings).__name__}"
             raise InvalidInput("settings of the light grid", problem, "give a GridSettings")
-        empty = cls(settings, finite_bounds(bounds), probes, 1.0, 0, None, None, "", "")
+        empty = cls(settings, finite_bounds(bounds), require_points(probes), 1.0, 0, None, None, "", "")
         return empty.moved(light_mesh, progress)
 
     def moved(self, light_mesh: VirtualLightMesh, progress: Progress = silent) -> LightGrid:
@@ -159,11 +159,12 @@ class LightGrid:
     def relit(self, light_mesh: VirtualLightMesh, radiosity: npt.ArrayLike) -> LightGrid:
         """The grid under other light; radiosity: (n, 3) W/m². In range mode the same, in the other the same trees.
 
-        Raises InvalidInput where the radiosity cannot be used, or the light mesh has another number of lights.
+        Raises InvalidInput where the radiosity cannot be used, or the light mesh is not the one that was baked.
         """
         if len(light_mesh) != self.light_count:
             problem = f"it has {len(light_mesh):,} lights, the light grid was baked from {self.light_count:,}"
             raise InvalidInput("light mesh", problem, "relight with the light mesh that was baked, or bake again")
+        self.require_made_of(light_mesh)
         values = usable_radiosity(light_mesh, radiosity)
         return self._lit([_unlit(self.static), _unlit(self.dynamic)], light_mesh, values)
 

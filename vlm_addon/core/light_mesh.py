@@ -126,6 +126,11 @@ def require_valid(light_mesh: VirtualLightMesh) -> None:
         if len(values) != count:
             problem = f"{len(values)} rows for {count} lights"
             raise InvalidInput(f"light mesh {field_.name}", problem, "give one row per light")
+    known = (light_mesh.triangles >= 0) & (light_mesh.triangles < len(light_mesh.vertices))
+    if not known.all():
+        row = int(np.argmin(known.all(axis=1)))
+        problem = f"corners {light_mesh.triangles[row]} of {len(light_mesh.vertices)} vertices"
+        raise InvalidInput(f"light {row}", problem, "give indices of vertices that there are")
     for name in ("vertices", "colour", "emission", "strength"):
         values = getattr(light_mesh, name)
         if not np.isfinite(values).all():

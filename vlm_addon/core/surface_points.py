@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .errors import InvalidInput
 from .sampling import square_to_triangle
 from .scene import Float64, Int32, Mesh
 
@@ -22,6 +23,22 @@ class SurfacePoints:
 
 
 NO_POINTS = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int32))
+
+
+def require_points(points: SurfacePoints) -> SurfacePoints:
+    """The same points. Raises InvalidInput where they are not SurfacePoints, or not finite rows of three each."""
+    remedy = "give SurfacePoints, as random_surface_points makes them"
+    if not isinstance(points, SurfacePoints):
+        raise InvalidInput("surface points", f"they are of type {type(points).__name__}", remedy)
+    count = len(points.tag_ids)
+    for name in ("positions", "normals"):
+        values = getattr(points, name)
+        if np.shape(values) != (count, 3):
+            problem = f"{name} of shape {np.shape(values)} for {count} tags"
+            raise InvalidInput("surface points", problem, remedy)
+        if not np.isfinite(values).all():
+            raise InvalidInput("surface points", f"{name} that are not finite", remedy)
+    return points
 
 
 def random_surface_points(meshes: Sequence[Mesh], count: int, seed: int = 0) -> SurfacePoints:
