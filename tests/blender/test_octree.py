@@ -90,6 +90,20 @@ def test_five_poses_of_the_dancer(device):
     assert kept.built["dynamic_octree"] == 5
 
 
+@pytest.mark.full
+def test_fifty_frames_of_the_dancer_take_no_more_memory(device):
+    """Twice the same 25 poses: the second round finds every buffer large enough."""
+    kept, taken = Kept(), []
+    for pose in (*range(1, 26), *range(1, 26)):
+        snapshot = opened("dancer", pose)
+        with device.current() as context:
+            taken.append(scene_octree(context, device.shaders, kept, snapshot, 128).device_bytes)
+    assert kept.built["static_octree"] == 1
+    assert kept.built["dynamic_octree"] == 50
+    assert len(set(taken[25:])) == 1
+    assert taken[-1] <= 2 * taken[0]
+
+
 def spot(depth):
     """A closed cow of (t, 3, 3) triangles in voxel coordinates."""
     if not SPOT.exists():
