@@ -140,7 +140,7 @@ def starting_blocks(places: Float64, depth: int, deepest: int, growth: float) ->
     x, y, z = (high - low).T
     extent = np.maximum(np.maximum(x, y), np.maximum(z, 0.5))
     levels = np.clip(np.floor(depth - 1 - np.log2(extent)), 1, deepest).astype(np.int64)
-    cells_along = np.ldexp(1.0, levels)[:, None]
+    cells_along = (1 << levels).astype(np.float64)[:, None]
     # What touches a face meets the cells on both sides of it.
     cells = np.clip(np.ceil(low * (cells_along * 2.0**-depth)) - 1, 0, cells_along - 2)
     return StartingBlocks(levels, cells.astype(np.int64))

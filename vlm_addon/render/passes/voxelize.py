@@ -48,7 +48,7 @@ _TRIANGLE_BYTES, _BLOCK_BYTES = 48, 8
 
 def lattice_step(depth: int) -> float:
     """Coordinates from 0 to 2^depth are multiples of this on the device: differences of two are exact in float32."""
-    return float(np.ldexp(1.0, depth - 24))
+    return 2.0 ** float(depth - 24)
 
 
 def growth_of(depth: int) -> float:
