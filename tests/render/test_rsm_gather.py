@@ -17,7 +17,6 @@ import pytest
 from tests.render.closed_rooms import ROOM_REFLECTANCES, ROOM_SIZE, empty_room, inward_box, room_area, wall_points
 from tests.render.gathering import COLUMNS, gathered
 from tests.render.rooms import box_room, camera_at
-from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.lamps import lamp_irradiance
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, SceneSnapshot
@@ -222,18 +221,6 @@ def test_lamps_that_cast_no_shadow_are_named(device: Device) -> None:
     frame = rendered(device, empty_room([replace(MIDDLE, name="Ghost", casts_shadow=False), LAMPS["spot"]]))
     assert len(frame.reasons) == 1
     assert "Ghost" in frame.reasons[0]
-
-
-def test_stop_is_heard_while_gathering(device: Device) -> None:
-    labels: list[str] = []
-
-    def stop(fraction: float, label: str) -> bool:
-        labels.append(label)
-        return label != "gather"
-
-    with pytest.raises(Cancelled):
-        device.render(box_room(), None, RenderSettings(32, 24, "rsm_gather", {}, 1, 64, 4), stop)
-    assert labels[-1] == "gather"
 
 
 def test_sun_bounces_off_the_floor_onto_a_wall(device: Device) -> None:

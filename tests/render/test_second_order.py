@@ -20,7 +20,6 @@ from tests.render.closed_rooms import (
 from tests.render.gathering import COLUMNS, picture_of
 from tests.render.rooms import box_room, camera_at, quad
 from tests.render.test_rsm_gather import LAMPS, MIDDLE, reflected_power, wall_grid
-from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.lamps import LampSample, lamp_irradiance
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.progress import silent
@@ -348,15 +347,3 @@ def test_names_of_buffers_begin_with_the_techniques(device: Device) -> None:
     names = {name for name in rendered(device, box_room()).images if name.startswith("second_order")}
     parts = ("positive", "negative", "discontinuity", "low_resolution", "lights")
     assert names == {f"second_order_{part}" for part in parts}
-
-
-def test_stop_is_heard_while_gathering(device: Device) -> None:
-    labels: list[str] = []
-
-    def stop(fraction: float, label: str) -> bool:
-        labels.append(label)
-        return label != "gather"
-
-    with pytest.raises(Cancelled):
-        device.render(box_room(), None, RenderSettings(32, 24, "second_order", {}, 1, 64, 4), stop)
-    assert labels[-1] == "gather"

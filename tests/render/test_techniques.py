@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.render.rooms import box_room, mesh_lights
-from vlm_addon.core.errors import InvalidInput
+from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.light_mesh import empty_light_mesh
 from vlm_addon.core.settings import describe
 from vlm_addon.render import technique, techniques
@@ -83,3 +83,24 @@ def test_pictures_are_finite_not_negative_and_the_same_each_time(device: Device,
         assert (image == second.images[image_name]).all(), image_name
     assert first.images["direct"].max() > 0.0
     assert (first.images["indirect"].max() > 0.0) == (name != "direct")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_stop_is_heard_in_every_part_of_a_frame(device: Device, name: str) -> None:
+    room = box_room()
+    lights = mesh_lights(room.meshes, colour=0.5, emission=0.1)
+    settings = RenderSettings(technique=name, **SMALL)  # type: ignore[arg-type]
+    labels: list[str] = []
+
+    def watch(fraction: float, label: str) -> bool:
+        labels.append(label)
+        return label != stop_at
+
+    stop_at = ""
+    device.render(room, lights, settings, watch)
+    for stop_at in dict.fromkeys(labels):
+        labels.clear()
+        with pytest.raises(Cancelled):
+            device.render(room, lights, settings, watch)
+        assert labels[-1] == stop_at
+        assert labels.count(stop_at) == 1
