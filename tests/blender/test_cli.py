@@ -182,6 +182,8 @@ def test_techniques_lists_each_with_its_settings(tmp_path, capsys):
     assert run(capsys, "techniques", "--json", report)[0] == 0
     listed = json.loads(report.read_text())["techniques"]
     assert {"direct", "vlm"} <= {technique["name"] for technique in listed}
+    main(["techniques"])
+    assert "lights=tolerance  (tolerance, range, all)" in capsys.readouterr().out
 
 
 BAD_OPTIONS = {

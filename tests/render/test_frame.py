@@ -201,6 +201,14 @@ def test_sizes_out_of_range_are_refused(device: Device, name: str, value: int) -
         device.render(box_room(), None, replace(settings(), **{name: value}))  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("power", [np.nan, np.inf])
+def test_a_lamp_whose_power_is_no_number_is_refused(device: Device, power: float) -> None:
+    room = box_room()
+    lamps = (replace(room.lights[0], name="broken", power=(power, 1.0, 1.0)),)
+    with pytest.raises(InvalidInput, match=r"'broken'.*power"):
+        device.render(replace(room, lights=lamps), None, RenderSettings(8, 8, "direct"))
+
+
 def test_lights_that_are_not_finite_are_refused(device: Device) -> None:
     room = box_room()
     lights = mesh_lights(room.meshes, emission=np.nan)

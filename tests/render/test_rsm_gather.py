@@ -260,6 +260,9 @@ def test_images_show_every_step(device: Device) -> None:
         places = images[f"map_{index}_position"][shown] - offset
         on_wall = np.abs(np.abs(places) - 0.5 * np.array(ROOM_SIZE)).min(axis=1)
         assert on_wall.max() < 1e-4
+        depth = images[f"map_{index}_depth"][..., 0][shown]
+        distance = np.linalg.norm(places + offset - moved.lights[index].position, axis=1)
+        assert ((depth > 0.0) & (depth <= distance * (1.0 + 1e-4))).all()
         found = images[f"map_{index}_flux"].sum(axis=(0, 1), dtype=float)
         np.testing.assert_allclose(found, reflected_power(lamp), rtol=0.01)
         looked = images[f"map_{index}_places"]

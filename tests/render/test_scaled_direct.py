@@ -53,6 +53,13 @@ def test_without_lamps_nothing_is_scaled(device: Device) -> None:
     assert rendered(device, dark, "scaled_direct").images["combined"][..., :3].max() == 0.0
 
 
+def test_the_worlds_light_is_left_out_of_what_knows_no_shadow(device: Device) -> None:
+    closed = replace(empty_room([]), world_radiance=(2.0, 2.0, 2.0))
+    frame = rendered(device, closed, "scaled_direct", samples=1)
+    assert frame.images["indirect"].max() == 0.0
+    assert "the world's light is not scaled" in frame.reasons[0]
+
+
 def test_a_lamp_inside_a_block_lights_the_room_through_it(device: Device) -> None:
     """The technique's known bias: half of its light knows no shadow."""
     scene = room(replace(LAMPS["point"], position=(0.7, 0.25, -0.8)))

@@ -346,4 +346,5 @@ def test_lights_are_marked_in_the_picture_where_they_are(device: Device) -> None
 def test_names_of_buffers_begin_with_the_techniques(device: Device) -> None:
     names = {name for name in rendered(device, box_room()).images if name.startswith("second_order")}
     parts = ("positive", "negative", "discontinuity", "low_resolution", "lights")
-    assert names == {f"second_order_{part}" for part in parts}
+    maps = {f"second_order_map_0_{part}" for part in ("position", "normal", "flux", "depth")}
+    assert names == {f"second_order_{part}" for part in parts} | maps

@@ -248,17 +248,16 @@ def techniques_command(arguments: Namespace) -> None:
     """`techniques`: prints each technique with its settings, defaults, units and sources."""
     listed = []
     for technique in technique_list():
-        print(f"{technique.name}: {technique.description}")
+        print(f"{technique.name}: {technique.description}\n  known bias: {technique.known_bias()}")
         settings = list(describe(technique.settings))
         for setting in settings:
-            span = f"{setting.low} to {setting.high} {setting.unit}".strip()
-            source = f" [{setting.source}]" if setting.source else ""
-            print(f"  {setting.name}={setting.default}  ({span}) {setting.text}{source}")
+            print(f"  {setting.name}={setting.default}  ({setting.span}) {setting.text} [{setting.source}]")
         listed.append(
             {
                 "name": technique.name,
                 "label": technique.label,
                 "description": technique.description,
+                "known_bias": technique.known_bias(),
                 "needs_light_mesh": technique.needs_light_mesh,
                 "settings": [asdict(setting) | {"type": setting.type.__name__} for setting in settings],
             }

@@ -60,8 +60,13 @@ def _value(owner: Any, info: SettingInfo) -> Any:
 
 
 def _property(info: SettingInfo) -> Any:
-    unit = f" ({info.unit})" if info.unit else ""
-    common = {"name": _title(info.name), "description": f"{info.text}{unit}", "default": info.default}
+    notes = [info.unit, f"source: {info.source}" if info.source else ""]
+    told = ", ".join(note for note in notes if note)
+    common = {
+        "name": _title(info.name),
+        "description": f"{info.text} ({told})" if told else info.text,
+        "default": info.default,
+    }
     limits = {key: value for key, value in (("min", info.low), ("max", info.high)) if value is not None}
     if info.choices:
         return bpy.props.EnumProperty(items=[(name, _title(name), "") for name in info.choices], **common)
@@ -112,6 +117,11 @@ def _settings_group(technique: type[Technique]) -> type | None:
     return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations}) if annotations else None
 
 
+def _tooltip(technique: type[Technique]) -> str:
+    # Blender ends tooltips with a full stop of its own.
+    return f"{technique.description}. Known bias: {technique.known_bias()}".removesuffix(".")
+
+
 def _scene_group(groups: dict[str, type | None]) -> type:
     defaults = {field.name: field.default for field in dataclasses.fields(RenderSettings)}
     (target,) = (info for info in describe(SimplifySettings) if info.name == "target_triangles")
@@ -119,7 +129,7 @@ def _scene_group(groups: dict[str, type | None]) -> type:
         "technique": bpy.props.EnumProperty(
             name="Technique",
             description="How indirect light is computed",
-            items=[(each.name, each.label, each.description) for each in technique_list()],
+            items=[(each.name, each.label, _tooltip(each)) for each in technique_list()],
             default=defaults["technique"],
         ),
         "samples": bpy.props.IntProperty(

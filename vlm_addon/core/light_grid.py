@@ -28,7 +28,7 @@ from .light_tree_error import expected_error
 from .progress import Progress, silent, step
 from .range_grid import RangeGrid, RangeSettings
 from .scene import Float64
-from .settings import setting
+from .settings import OWN, setting
 from .surface_points import NO_POINTS, SurfacePoints, require_points
 from .window_factor import window_factor
 
@@ -50,7 +50,9 @@ class GridSettings(RangeSettings):
     mode: str = setting(
         TOLERANCE, "", None, None, "Far lights together, or lists of near lights", choices=(TOLERANCE, RANGE)
     )
-    tolerance: float = setting(0.02, "share", 1e-4, 1.0, "How far irradiance may be from the sum over all lights")
+    tolerance: float = setting(
+        0.02, "share", 1e-4, 1.0, "How far irradiance may be from the sum over all lights", source=OWN
+    )
 
     @property
     def of_range(self) -> RangeSettings:

@@ -14,6 +14,9 @@ from .errors import InvalidInput
 
 S = TypeVar("S")
 
+OWN = "own"
+"""Source of a setting that is in no document."""
+
 
 @dataclasses.dataclass(frozen=True)
 class SettingInfo:
@@ -32,6 +35,13 @@ class SettingInfo:
     source: str
     choices: tuple[str, ...]
     only_with: tuple[str, str] | None
+
+    @property
+    def span(self) -> str:
+        """What values there are, in words."""
+        if self.type is bool:
+            return "true or false"
+        return ", ".join(self.choices) if self.choices else f"{self.low} to {self.high} {self.unit}".strip()
 
 
 def setting(

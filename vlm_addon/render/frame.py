@@ -131,6 +131,9 @@ def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | 
     if snapshot.camera is None:
         raise InvalidInput(f"scene {snapshot.name!r}", "it has no camera", "add one and make it the active camera")
     require_usable(snapshot.camera)
+    for light in snapshot.lights:
+        if not np.isfinite(light.power).all():
+            raise InvalidInput(f"light {light.name!r}", f"its power is {light.power}", "give it a finite power")
     if light_mesh is not None:
         require_valid(light_mesh)
 

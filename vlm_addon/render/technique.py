@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from .device import PassTimer
 
 
+KNOWN_BIAS = "Known bias:"
+
+
 @dataclass(frozen=True)
 class SceneInputs:
     """What stays the same over the samples of a frame.
@@ -73,7 +76,7 @@ class NoSettings:
 
 
 class Technique(ABC):
-    """One way to find the indirect light; made anew for each frame. Its docstring states its known bias."""
+    """One way to find the indirect light; made anew for each frame. Its docstring states its KNOWN_BIAS."""
 
     name: ClassVar[str]
     label: ClassVar[str]
@@ -90,6 +93,11 @@ class Technique(ABC):
             raise InvalidInput(f"technique {self.name!r}", "the scene has no virtual light mesh", "bake one first")
         self.scene = scene
         self.chosen = settings
+
+    @classmethod
+    def known_bias(cls) -> str:
+        """What is wrong with it by its nature: what its docstring says after KNOWN_BIAS."""
+        return " ".join((inspect.getdoc(cls) or "").partition(KNOWN_BIAS)[2].split())
 
     @abstractmethod
     def indirect(self, frame: FrameInputs) -> moderngl.Texture | None:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from ...core.scene import Float32
-from ...core.settings import setting
+from ...core.settings import OWN, setting
 from ..buffer_pool import BufferPool
 from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS
@@ -76,10 +76,10 @@ class LowResolutionSettings:
     )
     normal_threshold: float = setting(
         0.2,
-        "",
+        "share",
         0.0,
         3.0,
-        "Length of the difference of unit normals from which on a pixel is gathered on its own; 0: all are, 3: none",
+        "Difference of unit normals, of their length, from which on a pixel is gathered alone; 0: all are, 3: none",
         source="001, 3.5: discontinuity threshold",
     )
     position_threshold: float = setting(
@@ -98,6 +98,7 @@ class LowResolutionSettings:
         2.0,
         "Difference between the neighbours' results, of the largest of them, above which a pixel is gathered on its "
         "own, as beside a light; 2: none is for that",
+        source=OWN,
     )
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from ...core.light_wave import Wave, WaveSettings
 from ...core.progress import Progress
 from ...core.scene import DIFFUSE, Float32
-from ...core.settings import setting
+from ...core.settings import OWN, setting
 from ...core.stacked_hemispheres import shadow_map_bytes
 from ..passes.accumulate import read_image
 from ..passes.phase_two import IrradianceImage
@@ -95,6 +95,7 @@ class Settings:
         0.0,
         100.0,
         "Brightness of the indirect light; at 1 a lamp's light is that at the mean distance to the end of the scene",
+        source=OWN,
     )
     specular: bool = setting(True, "", None, None, "Lights also show in glossy surfaces", source="000, eq. 4.5")
     shadows: str = setting(

@@ -4,18 +4,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...core.array_codec import content_hash
 from ...core.scene import Float32
-from ...core.settings import setting
+from ...core.settings import OWN, setting
 from ...core.world_light import merged_world_lights
+from ..map_settings import MapSettings, map_images, shown_maps
 from ..passes.accumulate import read_image
 from ..passes.low_resolution import LowResolutionGather, LowResolutionSettings, PickedPixels, SizedPasses
-from ..passes.rsm import LampReflections, ReflectiveShadowMap
+from ..passes.rsm import LampReflections
 from ..passes.rsm_gather import SQUARED, UNBIASED, Marks, Part, RsmGatherPass, Sampling, sample_taps
 from ..passes.temporal import TemporalPass
 from ..technique import FrameInputs, SceneInputs, Technique
@@ -27,12 +27,10 @@ STATIC, ROTATING = "static", "rotating"
 WHOLE, PART = "whole", "part"
 MOVING_AGE = 4.0
 """Pictures that a history counts for at most where something has moved in a lamp's view, with restart `part`."""
-MOST_IMAGES = 10
-"""Maps that are shown: the lamps of seed 003 (8)."""
 
 
 @dataclass(frozen=True)
-class Settings(LowResolutionSettings):
+class Settings(LowResolutionSettings, MapSettings):
     """How the maps are drawn and sampled."""
 
     samples: int = setting(
@@ -55,18 +53,13 @@ class Settings(LowResolutionSettings):
         source="003, 4.3.3",
         choices=(UNBIASED, SQUARED),
     )
-    resolution: int = setting(
-        256, "texels", 8, 2048, "Along a face of a lamp's map, to the nearest power of two", source="003, 6.2.2"
-    )
-    area_maps: int = setting(
-        4, "count", 1, 64, "Points of an area lamp that have a map each; one in its middle is off near the lamp"
-    )
     world_maps: int = setting(
         16,
         "count",
         1,
         1024,
         "Directions that the world's light is joined to, with a map each; few lose light that comes from the horizon",
+        source=OWN,
     )
     pattern: str = setting(
         STATIC,
@@ -93,6 +86,7 @@ class Settings(LowResolutionSettings):
         1,
         65536,
         "Earlier pictures that the mean counts at most; few let the pattern show as flicker",
+        source=OWN,
         only_with=("pattern", ROTATING),
     )
     restart: str = setting(
@@ -206,15 +200,14 @@ class RsmGather(Technique):
         return removed / (kept + removed) if removed > 0.0 else 0.0
 
     def images(self) -> dict[str, Float32]:
-        """Of the last picture: what bounds took off in W/m², low resolution and history; and of the first maps, in
-        their own sizes, position in m, normal, flux in W, and where the pixel amid the picture looked."""
+        """Of the last picture: what bounds took off in W/m², low resolution and history; and of the first maps what
+        `map_images` shows, and where the pixel amid the picture looked."""
         found = dict(self._low.images())
         if self._temporal is not None:
             found |= self._temporal.images()
         if self._irradiance is not None:
             found["bound_removes"] = np.ascontiguousarray(read_image(self._irradiance)[..., 3:])
-        for index, reflective_map in enumerate(islice(self._maps.maps(), MOST_IMAGES)):
-            found |= {f"map_{index}_{part}": image for part, image in map_images(reflective_map).items()}
+        found |= map_images(self._maps)
         if self._marks is not None:
             found |= {f"map_{index}_places": read_image(image) for index, image in self._marks.images.items()}
         return {f"{self.name}_{part}": image for part, image in found.items()}
@@ -224,7 +217,7 @@ class RsmGather(Technique):
         factor = self.chosen.low_resolution
         width, height = self.scene.settings.width, self.scene.settings.height
         images = {}
-        for index, found in enumerate(islice(self._maps.maps(), MOST_IMAGES)):
+        for index, found in enumerate(shown_maps(self._maps)):
             images[index] = self.scene.context.texture(
                 found.flux.size, 1, bytes(4 * found.flux.width * found.flux.height), dtype="f4"
             )
@@ -236,12 +229,3 @@ class RsmGather(Technique):
         if not names:
             return []
         return [f"light of {', '.join(names)} bounces off the nearest surfaces only, though it casts no shadow"]
-
-
-def map_images(found: ReflectiveShadowMap) -> dict[str, Float32]:
-    """Position in world space in m, normal, and flux in W of a map; 0 where it shows nothing; row 0 at the top."""
-    position, normal, flux = (read_image(texture) for texture in (found.position, found.normal, found.flux))
-    shown = normal[..., 3:] > 0.0
-    world = np.where(shown, found.space.world_points(position[..., :3]), 0.0)
-    images = {"position": world, "normal": normal[..., :3], "flux": flux[..., :3] * found.space.unit**2}
-    return {part: np.ascontiguousarray(image, np.float32) for part, image in images.items()}

@@ -36,12 +36,15 @@ class ScaledDirect(Technique):
     """Half of the direct light as it is, and the rest and more of it without shadows.
 
     Known bias: what faces away from every lamp stays black, shadows never get darker than the multiplier less 0.5, and
-    no colour bleeds: nothing of this is indirect light. Highlights show in shadows too.
+    no colour bleeds: nothing of this is indirect light. Highlights show in shadows too. What it adds comes through
+    walls, from a lamp that is shut in as from any other. The world's light is left out: it would light closed rooms.
     """
 
     name = "scaled_direct"
     label = "Scaled direct light"
-    description = "Shadows half as dark and everything else brighter, in place of bounced light: a cheap fallback"
+    description = (
+        "Shadows half as dark, through walls too, and all else brighter, in place of a bounce: a cheap fallback"
+    )
     settings = Settings
 
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
@@ -56,7 +59,9 @@ class ScaledDirect(Technique):
             outputs=2,
             uniforms=shares,
         )
-        self._shares = picture_shares(scene.snapshot.lights, scene.settings.samples)
+        lamps = tuple(light for light in scene.snapshot.lights if not light.from_world)
+        self._shadows = scene.shadows.for_lights(lamps)
+        self._shares = picture_shares(lamps, scene.settings.samples)
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """What is added to the diffuse light: never negative, since shadows take away at most what is added."""
@@ -64,13 +69,19 @@ class ScaledDirect(Technique):
         with self.scene.timer.measure("scaled direct light"):
             return self._pass.render(
                 frame.gbuffer,
-                self.scene.shadows,
+                self._shadows,
                 frame.view,
                 index,
                 settings.samples,
                 settings.shadow_samples,
                 self._shares[index],
             )
+
+    def reasons(self) -> list[str]:
+        """Why the world's light is not scaled."""
+        if len(self._shadows.lights) == len(self.scene.snapshot.lights):
+            return []
+        return ["the world's light is not scaled: without shadows it would light closed rooms"]
 
     def specular(self) -> moderngl.Texture:
         """What is added to the highlights."""

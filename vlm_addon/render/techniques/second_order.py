@@ -17,6 +17,7 @@ from ...core.surface_points import SurfacePoints, random_surface_points
 from ...core.vpl import VirtualPointLights
 from ..gpu_layout import VIRTUAL_POINT_LIGHT
 from ..indirect_lights import IndirectLights, light_records
+from ..map_settings import MapSettings, map_images
 from ..passes.accumulate import read_image
 from ..passes.gbuffer import GBuffer
 from ..passes.low_resolution import LowResolutionGather, LowResolutionSettings, PickedPixels, SizedPasses
@@ -59,16 +60,10 @@ class Placement:
         "Lights that take away what surfaces stop, on the dark sides of those in the picture; 0: nothing is occluded",
         source="001, 3.3, table 1",
     )
-    resolution: int = setting(
-        256, "texels", 8, 2048, "Along a face of a lamp's map, to the nearest power of two", source="001, 4"
-    )
-    area_maps: int = setting(
-        4, "count", 1, 64, "Points of an area lamp that have a map each; one in its middle is off near the lamp"
-    )
 
 
 @dataclass(frozen=True)
-class Settings(LowResolutionSettings, Placement):
+class Settings(LowResolutionSettings, MapSettings, Placement):
     """Lights, and where a low resolution does."""
 
 
@@ -240,7 +235,7 @@ class SecondOrder(Technique):
 
     def images(self) -> dict[str, Float32]:
         """Irradiance from either kind of light at full resolution, where the low resolution did not do, what was found
-        at low resolution, and the lights in the picture: white, negative ones blue."""
+        at low resolution, the first maps, and the lights in the picture: white, negative ones blue."""
         frame = self._frame
         if frame is None:
             return {}
@@ -248,6 +243,7 @@ class SecondOrder(Technique):
         positive = read_image(self._gathered(whole, self._none, frame.progress))[..., :3]
         taken = positive - read_image(self._gathered(whole, self._negative, frame.progress))[..., :3]
         found = {"positive": positive, "negative": np.maximum(taken, 0.0), **self._low.images()}
+        found |= map_images(self._maps)
         found["lights"] = self._marked(frame)
         return {f"{self.name}_{name}": np.ascontiguousarray(image, np.float32) for name, image in found.items()}
 
