@@ -93,14 +93,14 @@ def test_a_moved_lamp_changes_only_what_clusters_send_out(own_device: Device) ->
     lights = wall_lights(box_room())
     own_device.render(scene_with_lamp_at(0.5), lights, settings())
     found = built(own_device.render(scene_with_lamp_at(0.6), lights, settings()))
-    assert found == dict.fromkeys(TREES, 0) | {"scale": 1, "static_clusters": 1}
+    assert found == dict.fromkeys(TREES, 0) | {"window_factor": 1, "scale": 1, "static_clusters": 1}
 
 
 def test_a_turned_mesh_builds_only_the_tree_of_what_moves(own_device: Device) -> None:
     room = box_room()
     own_device.render(room, join([wall_lights(room), turning_lights(0.0)]), settings())
     found = built(own_device.render(room, join([wall_lights(room), turning_lights(0.1)]), settings()))
-    assert found == dict.fromkeys(TREES, 0) | {"dynamic_tree": 1, "dynamic_clusters": 1, "scale": 1}
+    assert found == dict.fromkeys(TREES, 0) | {"dynamic_tree": 1, "window_factor": 1, "scale": 1, "dynamic_clusters": 1}
 
 
 def test_a_grid_of_static_lights_is_kept_when_a_mesh_moves(own_device: Device) -> None:
