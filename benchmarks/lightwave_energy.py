@@ -8,6 +8,7 @@ ratio is what its rules make it, and changes with every parameter.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -80,6 +81,8 @@ def reflected(scene: SceneSnapshot, wall: Mesh) -> Float64:
 
 def main() -> None:
     """Prints a row for each lamp and variant."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args()
     room = open_sample("empty_room").snapshot
     rows = []
     with Device() as device:

@@ -8,7 +8,7 @@ squared weight loses more than half whatever their number. What frames take in t
 
 from __future__ import annotations
 
-import sys
+import argparse
 
 from benchmarks.support import open_sample, quiet
 from vlm_addon.blender.cycles_reference import render_reference
@@ -18,9 +18,7 @@ from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.terminal import table
 
 SCENES = ("empty_room", "cornell_box", "monkey_box")
-SIZE_PX = 64
 PICTURES = 8
-REFERENCE_SAMPLES = 1024
 VARIANTS: dict[str, dict[str, object]] = {
     "200 samples": {},
     "at every pixel": {"low_resolution": 1},
@@ -36,19 +34,24 @@ VARIANTS: dict[str, dict[str, object]] = {
 
 
 def main() -> None:
-    """Prints a row for each scene (all, or those named as arguments) and variant, the light mesh as a comparison."""
+    """Prints a row for each scene and variant, the light mesh as a comparison."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", default=SCENES, help=f"sample scenes (default: {', '.join(SCENES)})")
+    parser.add_argument("--size", type=int, default=64, help="pixels along a side of each picture")
+    parser.add_argument("--reference-samples", type=int, default=1024)
+    options = parser.parse_args()
     rows = []
-    for scene in sys.argv[1:] or SCENES:
+    for scene in options.scenes:
         with quiet():
             found = open_sample(scene)
-            reference = render_reference(SIZE_PX, SIZE_PX, 1, REFERENCE_SAMPLES)
+            reference = render_reference(options.size, options.size, 1, options.reference_samples)
         truth = reference.images["indirect"]
         runs = [(name, "rsm_gather", values) for name, values in VARIANTS.items()]
         if found.light_mesh is not None:
             runs.append(("virtual light mesh", "vlm", {}))
         with Device() as device:
             for name, technique, values in runs:
-                settings = RenderSettings(SIZE_PX, SIZE_PX, technique, values, PICTURES)
+                settings = RenderSettings(options.size, options.size, technique, values, PICTURES)
                 frame = device.render(found.snapshot, found.light_mesh, settings)
                 indirect = frame.images["indirect"]
                 removed = frame.counters.get("bound_removes_share")

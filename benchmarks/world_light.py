@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import bpy
@@ -35,8 +35,10 @@ from vlm_addon.terminal import table
 
 MAP_SIZE = (256, 512)
 COUNTS = (16, 32, 64, 128, 256)
-MANY_LIGHTS = 1024
-SIZE = (160, 120)
+TRUTH_FACTOR = 4
+"""Times the largest number in the tables: the lights of the phase one that the others are compared with."""
+PICTURED_COUNTS = 4
+"""So many of the numbers, from the first on, are rendered as pictures too."""
 VIRTUAL_LIGHTS = 400
 ORIENTATIONS = 400
 NAMES = ("even", "sun")
@@ -45,19 +47,23 @@ NAMES = ("even", "sun")
 def main() -> None:
     """Prints three tables."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--size", default="160x120")
+    parser.add_argument("--skies", nargs="+", default=NAMES, choices=NAMES)
+    parser.add_argument("--counts", nargs="+", type=int, default=COUNTS, help="numbers of lights")
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--reference-samples", type=int, default=512)
     arguments = parser.parse_args()
-    print(table(("sky", "lights", "rms", "largest", "ms"), [row for name in NAMES for row in irradiance_rows(name)]))
+    skies = [row for name in arguments.skies for row in irradiance_rows(name, arguments.counts)]
+    print(table(("sky", "lights", "rms", "largest", "ms"), skies))
     pictures: list[tuple[str, ...]] = []
     radiosity: list[tuple[str, ...]] = []
     with Device() as device:
-        for name in NAMES:
+        for name in arguments.skies:
             with quiet():
                 build_courtyard(radiance_map(name))
                 snapshot = extract_scene()
             light_mesh = create_light_mesh(snapshot.meshes, SimplifySettings(VIRTUAL_LIGHTS)).light_mesh
-            radiosity += phase_one_rows(device, name, snapshot, light_mesh)
+            radiosity += phase_one_rows(device, name, snapshot, light_mesh, arguments.counts)
             pictures += picture_rows(device, name, snapshot, light_mesh, arguments)
     print(f"\n{table(('sky', 'lights', 'phase one, rms', 'power'), radiosity)}")
     header = ("sky", "lights", "of direct light", "direct", "mean", "noise", "indirect", "mean", "noise", "s")
@@ -79,7 +85,7 @@ def radiance_map(name: str) -> Float64:
     return radiance
 
 
-def irradiance_rows(name: str) -> Iterator[tuple[str, ...]]:
+def irradiance_rows(name: str, counts: Sequence[int]) -> Iterator[tuple[str, ...]]:
     """For each count of lights."""
     index = np.arange(ORIENTATIONS) + 0.5
     z, turn = 1.0 - 2.0 * index / ORIENTATIONS, math.pi * (1.0 + math.sqrt(5.0)) * index
@@ -89,7 +95,7 @@ def irradiance_rows(name: str) -> Iterator[tuple[str, ...]]:
     sent = (radiance * map_solid_angles(*MAP_SIZE)[:, None, None]).reshape(-1, 3)
     truth = np.maximum(normals @ map_directions(*MAP_SIZE).reshape(-1, 3).T, 0.0) @ sent
     environment = Environment(name, radiance.astype(np.float32), np.eye(3))
-    for count in COUNTS:
+    for count in counts:
         start = time.perf_counter()
         lights = world_lights((0.0, 0.0, 0.0), environment, count)
         milliseconds = 1000.0 * (time.perf_counter() - start)
@@ -100,7 +106,7 @@ def irradiance_rows(name: str) -> Iterator[tuple[str, ...]]:
 
 
 def phase_one_rows(
-    device: Device, name: str, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
+    device: Device, name: str, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, counts: Sequence[int]
 ) -> Iterator[tuple[str, ...]]:
     """For each count of lights."""
 
@@ -112,8 +118,8 @@ def phase_one_rows(
             buffer = PhaseOnePass(context, device.shaders).render(light_mesh, geometry.origin, shadows, 1)
             return read_radiosity(buffer, len(light_mesh)).astype(np.float64)
 
-    truth, areas = radiosity(MANY_LIGHTS), light_mesh.areas[:, None]
-    for count in COUNTS:
+    truth, areas = radiosity(TRUTH_FACTOR * max(counts)), light_mesh.areas[:, None]
+    for count in counts:
         found = radiosity(count)
         error = math.sqrt((areas * (found - truth) ** 2).sum() / (areas * truth**2).sum())
         yield name, str(count), f"{error:.2%}", f"{(areas * found).sum() / (areas * truth).sum() - 1.0:+.2%}"
@@ -123,10 +129,11 @@ def picture_rows(
     device: Device, name: str, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, arguments: argparse.Namespace
 ) -> Iterator[tuple[str, ...]]:
     """For each count of lights."""
+    width, height = (int(part) for part in arguments.size.split("x"))
     with quiet():
-        reference = render_reference(*SIZE, 1, arguments.reference_samples)
-    for count in COUNTS[:4]:
-        settings = RenderSettings(*SIZE, "vlm", samples=arguments.samples, world_lights=count)
+        reference = render_reference(width, height, 1, arguments.reference_samples)
+    for count in arguments.counts[:PICTURED_COUNTS]:
+        settings = RenderSettings(width, height, "vlm", samples=arguments.samples, world_lights=count)
         start = time.perf_counter()
         frame = device.render(snapshot, light_mesh, settings)
         seconds = time.perf_counter() - start
@@ -166,7 +173,6 @@ def _add_polygon(name: str, corners: list[tuple[float, float, float]], material:
 
 def _diffuse(name: str, color: tuple[float, float, float]) -> Any:
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
     nodes = material.node_tree.nodes
     nodes.clear()
     shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
@@ -193,7 +199,6 @@ def _add_world(radiance: Float64) -> None:
     image.pixels.foreach_set(pixels.ravel())
     image.pack()
     world = bpy.context.scene.world = bpy.data.worlds.new("sky")
-    world.use_nodes = True
     nodes = world.node_tree.nodes
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
