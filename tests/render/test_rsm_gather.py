@@ -16,7 +16,7 @@ import pytest
 
 from tests.render.closed_rooms import ROOM_REFLECTANCES, ROOM_SIZE, empty_room, inward_box, room_area, wall_points
 from tests.render.gathering import COLUMNS, gathered
-from tests.render.rooms import box_room, camera_at
+from tests.render.rooms import camera_at
 from vlm_addon.core.lamps import lamp_irradiance
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, SceneSnapshot
@@ -184,24 +184,6 @@ def test_lamp_inside_a_wall_lights_nothing(device: Device) -> None:
 def rendered(device: Device, snapshot: SceneSnapshot, pictures: int = 1, **settings: object) -> Frame:
     wanted = RenderSettings(32, 24, "rsm_gather", settings, pictures, 64, 4, buffers=True)
     return device.render(snapshot, None, wanted)
-
-
-def test_frame_is_the_same_bit_for_bit_whatever_came_before(device: Device) -> None:
-    room = box_room()
-    first = rendered(device, room, 2)
-    rendered(device, empty_room([LAMPS["area"], LAMPS["spot"]]), 1)
-    second = rendered(device, room, 2)
-    for name, image in first.images.items():
-        assert (image == second.images[name]).all(), name
-    assert first.images["indirect"].max() > 0.0
-
-
-def test_light_switched_off_between_frames_leaves_nothing(device: Device) -> None:
-    room = box_room()
-    assert rendered(device, room).images["irradiance"].any()
-    off = rendered(device, replace(room, lights=tuple(replace(lamp, power=(0.0, 0.0, 0.0)) for lamp in room.lights)))
-    assert not off.images["irradiance"].any()
-    assert not rendered(device, replace(room, lights=())).images["irradiance"].any()
 
 
 def test_maps_are_drawn_once_for_all_pictures_of_a_frame_and_counted(device: Device) -> None:

@@ -248,16 +248,6 @@ def test_frame_is_the_same_bit_for_bit_whatever_came_before(device: Device) -> N
     assert first.images["indirect"].max() > 0.0
 
 
-def test_light_switched_off_between_frames_leaves_nothing(device: Device) -> None:
-    room = box_room()
-    assert rendered(device, room).images["irradiance"].any()
-    off = rendered(device, replace(room, lights=tuple(replace(lamp, power=(0.0, 0.0, 0.0)) for lamp in room.lights)))
-    assert not off.images["irradiance"].any()
-    assert not rendered(device, replace(room, lights=())).images["irradiance"].any()
-    again = rendered(device, room)
-    assert again.images["irradiance"].any()
-
-
 def slab_room() -> SceneSnapshot:
     """A lamp shines on the floor of a room; a slab above the floor shows its upper side, which faces away from that."""
     low, high = (-0.6, -0.6, 0.1), (0.6, 0.6, 0.2)

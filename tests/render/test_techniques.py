@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,3 +106,18 @@ def test_stop_is_heard_in_every_part_of_a_frame(device: Device, name: str) -> No
             device.render(room, lights, settings, watch)
         assert labels[-1] == stop_at
         assert labels.count(stop_at) == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_frame_is_the_same_to_the_bit_whatever_came_before(device: Device, name: str) -> None:
+    """Another scene, and the same scene with its lamps off, which has no light of theirs left in it."""
+    room = box_room()
+    dark = replace(room, lights=tuple(replace(lamp, power=(0.0, 0.0, 0.0)) for lamp in room.lights))
+    elsewhere = box_room((7.0, -3.0, 2.0))
+    lights = mesh_lights(room.meshes, colour=0.5, emission=0.0)
+    settings = RenderSettings(technique=name, buffers=True, **SMALL)  # type: ignore[arg-type]
+    first, off, _, again = (device.render(each, lights, settings) for each in (room, dark, elsewhere, room))
+    assert not off.images["irradiance"].any()
+    assert first.images["irradiance"].any() or name == "direct"
+    for image_name, image in first.images.items():
+        np.testing.assert_array_equal(again.images[image_name], image, err_msg=image_name)
