@@ -53,7 +53,7 @@ def test_every_pixel_is_split_once_and_nothing_else_shows(device: Device, width:
         gbuffer = random_gbuffer(device, size)
         split = SplitPass(context, device.shaders, *size, n)
         picked = split.render(gbuffer)
-        assert picked.gbuffer.size == (n * split.tile_size[0], n * split.tile_size[1])
+        assert picked.gbuffer.size == split.size == (n * split.tile_size[0], n * split.tile_size[1])
         x, y = split_places(size, n)
         beyond = np.ones(picked.gbuffer.size[::-1], bool)
         beyond[y, x] = False

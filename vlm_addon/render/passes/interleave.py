@@ -38,12 +38,12 @@ def tile_size(width: int, height: int, n: int) -> tuple[int, int]:
 
 
 class SplitPass:
-    """A G-buffer as n x n tiles side by side. tile_size: width and height of one, pixels."""
+    """A G-buffer as n x n tiles side by side. tile_size, size: width and height of one and of all, pixels."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int, n: int) -> None:
         """width, height: of the picture. n: from 1 on."""
         self.tile_size = tile_size(width, height, n)
-        size = n * self.tile_size[0], n * self.tile_size[1]
+        self.size = size = n * self.tile_size[0], n * self.tile_size[1]
         position, shading_normal, geometric_normal = (context.texture(size, 4, dtype="f4") for _ in range(3))
         ids, pixel = context.texture(size, 4, dtype="i4"), context.texture(size, 2, dtype="i4")
         # A gather reads neither base colour nor emission, but something has to be bound there.
