@@ -17,6 +17,7 @@ uniform float side;             // texels
 layout(location = 0) out vec4 out_position; // m, from the local origin; w: depth along the face's axis, m
 layout(location = 1) out vec4 out_normal;   // unit, on the lamp's side; w: surface in the texel, m²
 layout(location = 2) out vec4 out_flux;     // W; w: the texel's part of the map: sr of a cube, share of a single tile
+layout(location = 3) out vec4 out_geometric_normal; // unit, on the lamp's side
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy) - tile_corner;
@@ -26,7 +27,7 @@ void main() {
     vec2 place = (vec2(texel) + 0.5) * size - extent + centre;
     float measure = is_sun ? size.x * size.y : piece_solid_angle(place, size);
     out_flux = vec4(0.0, 0.0, 0.0, lamp.shadow_kind == SHADOW_CUBE ? measure : 1.0 / (side * side));
-    out_position = out_normal = vec4(0.0);
+    out_position = out_normal = out_geometric_normal = vec4(0.0);
     // The clockwise side is the inside of a solid: what a lamp in there lights does not shine out.
     if (!pixel_shows_geometry(texel) || seen_from_back(texelFetch(gbuffer_ids, texel, 0))) {
         return;
@@ -40,6 +41,7 @@ void main() {
     vec3 flux = diffuse_reflectance(surface, albedo_table) * received;
     out_position = vec4(surface.position, surface.depth);
     out_normal = vec4(surface.shading_normal, area);
+    out_geometric_normal = vec4(surface.geometric_normal, 0.0);
     out_flux.rgb = flux;
     vec3 radiosity = flux / max(area, 1e-30);
     for (int channel = 0; channel < 3; ++channel) {

@@ -25,5 +25,6 @@ void main() {
     light.area = surface.w;
     light.normal = surface.xyz;
     light.flux = texelFetch(rsm_flux, texel, 0).rgb;
+    light.geometric_normal = vec3(0.0);
     picked[first + i] = light;
 }

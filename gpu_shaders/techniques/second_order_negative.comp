@@ -64,6 +64,7 @@ void main() {
         negative.normal = squared > 0.0 ? mean * inversesqrt(squared) : vec3(0.0);
         negative.area = shown ? pixel_area(surface) : 0.0;
         negative.flux = squared > 0.0 ? group_flux[0] * negative.area : vec3(0.0);
+        negative.geometric_normal = vec3(0.0);
         negatives[gl_WorkGroupID.x] = negative;
     }
 }

@@ -241,9 +241,10 @@ four points. normal: flux over power. variances (xx, yy, zz), covariances (xy, y
 
 VIRTUAL_POINT_LIGHT = GpuStruct(
     "VirtualPointLight",
-    (("vec3", "position"), ("float", "area"), ("vec3", "normal"), ("vec3", "flux")),
+    (("vec3", "position"), ("float", "area"), ("vec3", "normal"), ("vec3", "flux"), ("vec3", "geometric_normal")),
 )
-"""core.vpl.VirtualPointLights, in metres from the local origin and watts; area of the piece of surface, m²."""
+"""core.vpl.VirtualPointLights, in metres from the local origin and watts; area of the piece of surface, m².
+geometric_normal: unit, of the triangle that the light lies on, where rays to it end; 0 where none is known."""
 
 STRUCTS: dict[str, GpuStruct] = {
     struct.name: struct

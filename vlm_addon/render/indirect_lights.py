@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,8 +44,7 @@ class _Picked:
 
 @dataclass(frozen=True)
 class _Source:
-    """A map. flux: W, what it reflects, mean of the channels. share: of the surfaces in it, which it lights for its
-    lamp or for the world: the other maps of these show much the same surfaces."""
+    """A map. flux: W, what it reflects, mean of the channels. share: of MapFluxes."""
 
     places: Places
     flux: float
@@ -65,19 +64,13 @@ class IndirectLights:
         units = {f"RSM_{name}_UNIT": FIRST_UNIT + i for i, name in enumerate(("POSITION", "NORMAL", "FLUX"))}
         bindings = {"TEXEL_BINDING": TEXEL_BINDING, "PICKED_BINDING": PICKED_BINDING}
         self._shader = shaders.compute("passes/rsm_pick.comp", {"GROUP_SIZE": GROUP_SIZE, **units, **bindings})
-        self.flux, self.brightest = np.zeros(3), np.zeros(3)
-        sources, is_world = [], []
-        for index, found in enumerate(maps.maps()):
-            flux = found.total_flux() * found.space.unit**2
-            self.flux += flux
-            self.brightest += found.brightest
-            places = places_in(found.record, found.side, 1 + index * POINTS_APART)
-            sources.append(_Source(places, float(flux.mean()), float(found.record["sample_weight"][0]), found.space))
-            is_world.append(float(found.record["world_solid_angle"][0]) > 0.0)
-        of_world = sum(source.flux for source, world in zip(sources, is_world, strict=True) if world)
+        fluxes = maps.fluxes()
+        self.flux, self.brightest = fluxes.flux.sum(axis=0), fluxes.brightest
         self._sources = [
-            replace(source, share=source.flux / of_world) if world and source.flux > 0.0 else source
-            for source, world in zip(sources, is_world, strict=True)
+            _Source(places_in(found.record, found.side, 1 + index * POINTS_APART), power, share, found.space)
+            for index, (found, power, share) in enumerate(
+                zip(maps.maps(), fluxes.powers.tolist(), fluxes.shares.tolist(), strict=True)
+            )
         ]
 
     def take(self, count: int, pictures: int = 1) -> list[VirtualPointLights]:

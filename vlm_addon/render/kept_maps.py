@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .passes.rsm import MapTextures, ReflectiveShadowMap
 
-BYTES_PER_TEXEL = 54
-"""Three images of 16 bytes, a third more for the mip levels of one."""
+BYTES_PER_TEXEL = 70
+"""Four images of 16 bytes, a third more for the mip levels of one."""
 
 
 class KeptMaps:

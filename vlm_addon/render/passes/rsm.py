@@ -22,6 +22,7 @@ from ..kept_maps import KeptMaps, map_bytes
 from ..lamp_records import lamp_record
 from ..lamp_scenes import LampScene, LampScenes
 from ..local_space import LocalSpace
+from ..map_fluxes import MapFluxes, measured_fluxes
 from ..rsm_views import FaceView, face_views, map_tiles
 from ..shader_library import ShaderLibrary, set_uniforms
 from .gbuffer import GBufferPass
@@ -39,11 +40,12 @@ CHANNELS = 3
 
 @dataclass(frozen=True)
 class MapTextures:
-    """What a map is drawn into. framebuffer: position, normal and the finest level of flux."""
+    """What a map is drawn into. framebuffer: position, normal, the finest level of flux, and geometric normal."""
 
     position: moderngl.Texture
     normal: moderngl.Texture
     flux: moderngl.Texture
+    geometric_normal: moderngl.Texture
     framebuffer: moderngl.Framebuffer
 
 
@@ -53,10 +55,11 @@ class ReflectiveShadowMap:
 
     All is in local units of `space`, which is not the frame's: `space` says how to take places into that or back.
     position: m from the local origin, and depth along the face's axis in m. normal: unit shading normal on the lamp's
-    side, and the area in m² that the texel covers. flux: W, and the texel's part of the map: sr of a cube's map, else
-    share of the map; 0 in faces that are not drawn. Its mip levels are sums, down to one texel a face. Where the lamp
-    sees nothing, or the clockwise side of a triangle, all but that part is 0. record: (1,) of gpu_layout.LAMP, with
-    the shadow_* fields of this map. side: texels along a face. brightest: (3,) W/m², the greatest radiosity in it.
+    side, and the area in m² that the texel covers. geometric_normal: unit, of the triangle, on that side, and 0. flux:
+    W, and the texel's part of the map: sr of a cube's map, else share of the map; 0 in faces that are not drawn. Its
+    mip levels are sums, down to one texel a face. Where the lamp sees nothing, or the clockwise side of a triangle, all
+    but that part is 0. record: (1,) of gpu_layout.LAMP, with the shadow_* fields of this map. side: texels along a
+    face. brightest: (3,) W/m², the greatest radiosity in it.
     """
 
     textures: MapTextures
@@ -79,6 +82,11 @@ class ReflectiveShadowMap:
     def flux(self) -> moderngl.Texture:
         """What each texel reflects, and its part of the map."""
         return self.textures.flux
+
+    @property
+    def geometric_normal(self) -> moderngl.Texture:
+        """Normal of the triangle that is in each texel."""
+        return self.textures.geometric_normal
 
     @property
     def levels(self) -> int:
@@ -147,14 +155,16 @@ class ReflectiveShadowMapPass:
         """Textures of the size that maps of `light` need."""
         import moderngl
 
-        position, normal, flux = (self._context.texture(self.size(geometry, light), 4, dtype="f4") for _ in range(3))
+        size = self.size(geometry, light)
+        position, normal, flux, geometric_normal = (self._context.texture(size, 4, dtype="f4") for _ in range(4))
         flux.build_mipmaps(0, self.side(geometry, light).bit_length() - 1)
-        for texture in (position, normal):
+        for texture in (position, normal, geometric_normal):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         flux.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
-        for texture in (position, normal, flux):
+        targets = position, normal, flux, geometric_normal
+        for texture in targets:
             texture.repeat_x = texture.repeat_y = False
-        return MapTextures(position, normal, flux, self._context.framebuffer([position, normal, flux]))
+        return MapTextures(*targets, self._context.framebuffer(targets))
 
     def render(
         self,
@@ -246,6 +256,7 @@ class LampReflections:
                 for sample in range(count):
                     key = content_hash([scene.lamp_key, self._pass.face, sample, count])
                     self._sources.append(_Source(scene, sample, key))
+        self._kept = kept
         self._maps: KeptMaps = kept.get("reflective_maps", "", KeptMaps)
         self._maps.keep_only({source.key for source in self._sources})
         self._shared: dict[tuple[int, int], MapTextures] = {}
@@ -259,6 +270,10 @@ class LampReflections:
     def drawn(self) -> int:
         """Maps drawn so far in this frame."""
         return self._pass.drawn
+
+    def fluxes(self) -> MapFluxes:
+        """What the maps reflect; read from the device once for the same maps."""
+        return self._kept.get("map_fluxes", self.key, lambda: measured_fluxes(self.maps()))
 
     def draw(self) -> None:
         """Draws the maps that are to be kept and are not yet."""
