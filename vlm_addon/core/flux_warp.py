@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points of the unit square, warped so that their density follows the flux of maps.
 
-Clarberg et al. 2005; seed 004, 4.8. The oracle of lib/flux_warp.glsl. The importance of a texel is the flux it reflects, summed over the channels. A point
-descends a pyramid of sums: in each square of four texels it is first sent to one of the rows, then to one of the
-columns, in proportion to what these hold, and its coordinate is stretched over the part of [0, 1) that leads there. So
-points that are spread evenly stay so, and no texel of zero importance is ever reached. Several maps are a level above:
-the first coordinate chooses among them by their power and is stretched likewise. The number of points in a map is then
-right on average for any number of points and maps, where shares in whole numbers are not.
+Clarberg et al. 2005; seed 004, 4.8. The oracle of lib/flux_warp.glsl. The importance of a texel is the flux it
+reflects, summed over the channels. A point descends a pyramid of sums: in each square of four texels it is first sent
+to one of the rows, then to one of the columns, in proportion to what these hold, and its coordinate is stretched over
+the part of [0, 1) that leads there. So points that are spread evenly stay so, and no texel of zero importance is ever
+reached. Several maps are a level above: the first coordinate chooses among them by their power and is stretched
+likewise. The number of points in a map is then right on average for any number of points and maps, where shares in
+whole numbers are not.
 """
 
 from __future__ import annotations
