@@ -108,3 +108,37 @@ def convex_crossing(starts, ends, triangles):
         inside_at_start &= a < 0.0
         inside_at_end &= b < 0.0
     return (enter <= leave) & ~(inside_at_start & inside_at_end)
+
+
+def crossings(starts, ends, triangles):
+    """(n,) fraction of each segment at which it first meets any of (t, 3, 3) triangles, inf if none, and the triangle:
+    float64, every pair (Moeller and Trumbore 1997)."""
+    fractions, first = np.full(len(starts), np.inf), np.zeros(len(starts), int)
+    a, ab, ac = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    at_once = max(1, 2_000_000 // max(len(triangles), 1))
+    for begin in range(0, len(starts), at_once):
+        part = slice(begin, begin + at_once)
+        along = (ends - starts)[part, None].astype(float)
+        offset = starts[part, None].astype(float) - a
+        across = np.cross(along, ac)
+        turned = np.cross(offset, ab)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = 1.0 / (across * ab).sum(axis=2)
+            u, v = (across * offset).sum(axis=2) * scale, (turned * along).sum(axis=2) * scale
+            at = (turned * ac).sum(axis=2) * scale
+            meets = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (at >= 0.0) & (at <= 1.0)
+        at = np.where(meets, at, np.inf)
+        first[part] = at.argmin(axis=1)
+        fractions[part] = at.min(axis=1)
+    return fractions, first
+
+
+def surface_points(triangles, count, rng):
+    """(n, 3) points spread evenly over (t, 3, 3) triangles, and their unit normals."""
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    rows = rng.choice(len(triangles), count, p=area / area.sum())
+    u, v = rng.uniform(size=(2, count, 1))
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    a, b, c = (triangles[rows, corner] for corner in range(3))
+    return a + u * (b - a) + v * (c - a), across[rows] / area[rows, None]

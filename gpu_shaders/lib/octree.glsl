@@ -14,11 +14,22 @@
 
 layout(std430, binding = OCTREE_BINDING) readonly buffer Octree { uint octree_words[]; };
 
-// low, high: first and last voxel of the largest cube that holds a voxel and is empty, or one voxel that is occupied.
+// low, high: first and last voxel of the largest cube that holds a voxel and is empty, or one voxel that is occupied;
+// brick: the number of its brick where it is occupied.
 struct VoxelBox {
     ivec3 low;
     ivec3 high;
     bool occupied;
+    uint brick;
+};
+
+// A way through voxels. cell: where it is; last: where it ends; fraction: of the way, about where it came into `cell`.
+struct OctreeWalk {
+    vec3 start;
+    vec3 along;
+    ivec3 cell;
+    ivec3 last;
+    float fraction;
 };
 
 // Voxel coordinates of a position. frame: the octree's lower corner, and voxels for each unit of length.
@@ -41,7 +52,7 @@ VoxelBox octree_outside(ivec3 cell, int size) {
     ivec3 below = ivec3(lessThan(cell, ivec3(0))), above = ivec3(greaterThanEqual(cell, ivec3(size)));
     ivec3 low = above * size - (1 - above) * (4 * OCTREE_FAR);
     ivec3 high = (1 - below) * (4 * OCTREE_FAR) - below;
-    return VoxelBox(low, high, false);
+    return VoxelBox(low, high, false, 0u);
 }
 
 // What one of the trees in the buffer knows around a voxel.
@@ -69,33 +80,50 @@ VoxelBox octree_box(uint tree, ivec3 cell) {
     }
     int side = 1 << height;
     ivec3 low = cell & -side;
-    return VoxelBox(low, low + (side - 1), found);
+    return VoxelBox(low, low + (side - 1), found, node);
+}
+
+OctreeWalk octree_walk(vec3 start, vec3 end) {
+    return OctreeWalk(start, end - start, octree_cell(start), octree_cell(end), 0.0);
+}
+
+// No walk takes more steps than this.
+int octree_most_steps() {
+    return 3 * (1 << octree_words[1]) + 8;
+}
+
+// Moves a walk out of the cube of voxels from `low` to `high` that holds its cell, or returns false: it ends in there.
+bool octree_leave(inout OctreeWalk walk, ivec3 low, ivec3 high) {
+    ivec3 way = sign(walk.last - walk.cell), ahead = max(way, 0);
+    ivec3 far = ahead * high + (1 - ahead) * low;
+    bvec3 leaves = greaterThan((walk.last - far) * way, ivec3(0));
+    if (!any(leaves)) {
+        return false;
+    }
+    vec3 fractions = mix(vec3(2.0), (vec3(far + ahead) - walk.start) / walk.along, leaves);
+    float least = min(fractions.x, min(fractions.y, fractions.z));
+    // Not back, not out of the cube but where it is left, and not past the last voxel.
+    ivec3 limit = ahead * min(far, walk.last) + (1 - ahead) * max(far, walk.last);
+    ivec3 moved = octree_cell(walk.start + walk.along * least);
+    ivec3 next = clamp(moved, min(walk.cell, limit), max(walk.cell, limit));
+    int axis = fractions.x == least ? 0 : (fractions.y == least ? 1 : 2);
+    next[axis] = far[axis] + way[axis];
+    walk.cell = next;
+    walk.fraction = least;
+    return true;
 }
 
 // Whether one tree has no occupied voxel between two points in voxel coordinates, the points' own voxels included.
 bool octree_tree_clear(uint tree, vec3 start, vec3 end) {
-    vec3 along = end - start;
-    ivec3 cell = octree_cell(start), last = octree_cell(end);
-    int most_steps = 3 * (1 << octree_words[1]) + 8;
-    for (int i = 0; i < most_steps; ++i) {
-        VoxelBox box = octree_box(tree, cell);
+    OctreeWalk walk = octree_walk(start, end);
+    for (int i = octree_most_steps(); i > 0; --i) {
+        VoxelBox box = octree_box(tree, walk.cell);
         if (box.occupied) {
             return false;
         }
-        ivec3 way = sign(last - cell), ahead = max(way, 0);
-        ivec3 far = ahead * box.high + (1 - ahead) * box.low;
-        bvec3 leaves = greaterThan((last - far) * way, ivec3(0));
-        if (!any(leaves)) {
+        if (!octree_leave(walk, box.low, box.high)) {
             return true;
         }
-        vec3 fractions = mix(vec3(2.0), (vec3(far + ahead) - start) / along, leaves);
-        float least = min(fractions.x, min(fractions.y, fractions.z));
-        // Not back, not out of the cube but where it is left, and not past the last voxel.
-        ivec3 limit = ahead * min(far, last) + (1 - ahead) * max(far, last);
-        ivec3 next = clamp(octree_cell(start + along * least), min(cell, limit), max(cell, limit));
-        int axis = fractions.x == least ? 0 : (fractions.y == least ? 1 : 2);
-        next[axis] = far[axis] + way[axis];
-        cell = next;
     }
     return false;
 }
@@ -126,12 +154,13 @@ float octree_reach(vec3 normal) {
     return (abs(normal.x) + abs(normal.y) + abs(normal.z)) * (1.0 + OCTREE_SLACK);
 }
 
-// Where a way from a surface point to another begins, in voxel coordinates: over its own plane and over the other's by
-// the reach of each, so that neither surface's voxels stand in the way, nor floor and wall where they meet. Normals are
-// unit and geometric, or zero for a point in space.
-vec3 octree_lifted(vec3 place, vec3 normal, vec3 other_place, vec3 other_normal) {
-    vec3 lifted = place + normal * octree_reach(normal);
-    float missing = octree_reach(other_normal) - dot(other_normal, lifted - other_place);
+// Where a way from a surface point to another begins, in voxel coordinates: over its own plane by `reach` and over the
+// other's by `other_reach`. Normals are unit and geometric, or zero for a point in space.
+vec3 octree_lifted_by(
+    float reach, vec3 place, vec3 normal, float other_reach, vec3 other_place, vec3 other_normal
+) {
+    vec3 lifted = place + normal * reach;
+    float missing = other_reach - dot(other_normal, lifted - other_place);
     if (missing <= 0.0) {
         return lifted;
     }
@@ -139,6 +168,12 @@ vec3 octree_lifted(vec3 place, vec3 normal, vec3 other_place, vec3 other_normal)
     // lift is at most twice what is missing.
     float facing = min(dot(normal, other_normal), 0.0);
     return lifted + (other_normal - facing * normal) * (missing / max(1.0 - facing * facing, 0.25));
+}
+
+// Where a way through voxels alone begins: so high that neither surface's voxels stand in the way, nor floor and wall
+// where they meet.
+vec3 octree_lifted(vec3 place, vec3 normal, vec3 other_place, vec3 other_normal) {
+    return octree_lifted_by(octree_reach(normal), place, normal, octree_reach(other_normal), other_place, other_normal);
 }
 
 // Whether two surface points in voxel coordinates see each other. True where they are too near for voxels to tell.

@@ -2,14 +2,11 @@
 // The voxels that triangles meet, into the masks of bricks. One invocation for a brick and a triangle: the document's
 // voxel fragments (seed 004, 4.3.1), 64 at a time.
 #include "passes/voxelize_blocks.glsl"
-#include "lib/z_order.glsl"
+#include "passes/voxelize_rank.glsl"
 
-layout(std430, binding = BIT_BINDING) readonly buffer Bits { uint bits[]; };
-layout(std430, binding = RANK_BINDING) readonly buffer Ranks { uint ranks[]; };
 layout(std430, binding = OCTREE_BINDING) buffer Octree { uint octree[]; };
 
 uniform float growth;
-uniform uint brick_word; // first word of the bricks' level in `bits`
 uniform uint first_brick; // first word of the bricks in the octree
 
 void main() {
@@ -26,10 +23,7 @@ void main() {
         uvec3 first = 4u * brick + 2u * uvec3(i & 1u, i >> 1 & 1u, i >> 2);
         mask[i / 4u] |= cells_that_meet(triangle, first, 1.0, growth) << (8u * (i % 4u));
     }
-    uint code = z_order(brick);
-    uint word = brick_word + code / 32u;
-    uint before = uint(bitCount(bits[word] & ((1u << (code % 32u)) - 1u)));
-    uint place = first_brick + 2u * (ranks[word] - ranks[brick_word] + before);
+    uint place = first_brick + 2u * brick_number(brick);
     atomicOr(octree[place], mask[0]);
     atomicOr(octree[place + 1u], mask[1]);
 }

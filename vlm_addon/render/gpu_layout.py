@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.brdf import MAX_F0
+from ..core.brick_triangles import ALL_EXACT, EDGE_SHARE, LIFT_SHARE
 from ..core.lamps import NARROW_CONE
 from ..core.light_clusters import FADE, SOFTNESS
 from ..core.octree_march import FAR_OUTSIDE, SLACK
@@ -318,5 +319,8 @@ CONSTANTS: dict[str, int | float] = {
     "LEAST_COSINE": LEAST_COSINE,
     "OCTREE_FAR": FAR_OUTSIDE,
     "OCTREE_SLACK": SLACK,
+    "OCTREE_EDGE_SHARE": EDGE_SHARE,
+    "OCTREE_LIFT_SHARE": LIFT_SHARE,
+    "OCTREE_ALL_EXACT": ALL_EXACT,
 }
 """Numbers that Python and GLSL share; every shader sees them as `#define`s."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The octree of a scene on the device: static and dynamic objects in trees of their own, each kept until it changes.
+"""The octree of a scene on the device and the triangles behind its voxels: static and dynamic objects in trees of their
+own, each kept until it changes.
 
 Two trees beside each other rather than one that is merged: the static one is never touched, the dynamic one costs what
 its own triangles cost, and a walk asks both. Everything visible stands in the way except what is wholly transparent.
@@ -14,11 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.array_codec import content_hash
-from ..core.scene import Float64, Mesh, SceneSnapshot
+from ..core.scene import Float32, Float64, Mesh, SceneSnapshot
 from ..core.voxel_frame import VoxelFrame, make_voxel_frame
 from .growing_buffer import GrowingBuffer
 from .kept import Kept
 from .local_space import LocalSpace
+from .passes.brick_lists import GpuBrickLists
 from .passes.voxelize import GpuTree, VoxelizePass
 from .shader_library import ShaderLibrary
 
@@ -30,13 +32,21 @@ _KINDS = ("static", "dynamic")
 
 @dataclass(frozen=True)
 class SceneOctree:
-    """What lib/octree.glsl needs. buffer: for OCTREE_BINDING; frame: in the snapshot's space; trees: one or two in the
-    buffer; device_bytes: all that is kept on the device to make it again."""
+    """What lib/octree.glsl and lib/octree_triangles.glsl need. buffer: for OCTREE_BINDING; triangles: for
+    OCTREE_TRIANGLE_BINDING; frame: in the snapshot's space; trees, lists: one or two in the buffers; device_bytes: all
+    that is kept on the device to make it again."""
 
     buffer: moderngl.Buffer
+    triangles: moderngl.Buffer
     frame: VoxelFrame
     trees: tuple[GpuTree, ...]
+    lists: tuple[GpuBrickLists, ...]
     device_bytes: int
+
+    def bind(self, octree_binding: int, triangle_binding: int) -> None:
+        """Binds the octree, and the triangles of its bricks."""
+        self.buffer.bind_to_storage_buffer(octree_binding)
+        self.triangles.bind_to_storage_buffer(triangle_binding)
 
     def uniform(self, space: LocalSpace) -> tuple[float, float, float, float]:
         """The `frame` of lib/octree.glsl for positions in `space`: the lower corner and voxels for each unit."""
@@ -44,11 +54,12 @@ class SceneOctree:
         return x, y, z, space.unit / self.frame.voxel_size
 
     def counters(self) -> dict[str, float]:
-        """Nodes and bricks of all trees, and megabytes of them and of all that is kept."""
+        """Nodes and bricks of all trees, and megabytes of them, of their triangles and of all that is kept."""
         return {
             "octree_nodes": sum(tree.node_count for tree in self.trees),
             "octree_bricks": sum(tree.brick_count for tree in self.trees),
             "octree_mb": 1e-6 * sum(tree.nbytes for tree in self.trees),
+            "octree_triangle_mb": 1e-6 * sum(lists.nbytes for lists in self.lists),
             "octree_device_mb": 1e-6 * self.device_bytes,
         }
 
@@ -58,12 +69,24 @@ class _Builder:
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
         self.voxelize = VoxelizePass(context, shaders)
-        self.buffers = {kind: GrowingBuffer(context, f"the {kind} octree") for kind in (*_KINDS, "joined")}
+        kinds = (*_KINDS, "joined")
+        self.trees = {kind: GrowingBuffer(context, f"the {kind} octree") for kind in kinds}
+        self.lists = {kind: GrowingBuffer(context, f"the triangles of the {kind} octree") for kind in kinds}
 
     @property
     def nbytes(self) -> int:
         """On the device."""
-        return self.voxelize.pool.nbytes + sum(buffer.nbytes for buffer in self.buffers.values())
+        buffers = (*self.trees.values(), *self.lists.values())
+        return self.voxelize.pool.nbytes + sum(buffer.nbytes for buffer in buffers)
+
+    def build(self, kind: str, places: Float64, reflectance: Float32, depth: int) -> tuple[GpuTree, GpuBrickLists]:
+        """The tree of a kind of objects and the triangles of its bricks."""
+        return self.voxelize.build_with_lists(places, reflectance, depth, self.trees[kind], self.lists[kind])
+
+    def joined(self, built: Sequence[tuple[GpuTree, GpuBrickLists]]) -> tuple[moderngl.Buffer, moderngl.Buffer]:
+        """Buffers of all trees, and of the triangles of their bricks."""
+        trees = self.voxelize.join([tree for tree, _ in built], self.trees["joined"])
+        return trees, self.voxelize.join_lists([lists for _, lists in built], self.lists["joined"])
 
 
 def scene_octree(
@@ -77,32 +100,40 @@ def scene_octree(
     frame = make_voxel_frame(world.bounds(), resolution)
     builder = kept.get("octree_builder", "", lambda: _Builder(context, shaders))
     opaque = np.array([material.alpha > 0.0 for material in world.materials])
-    trees, keys = [], []
+    built, keys = [], []
     for kind in _KINDS:
         meshes = [mesh for mesh in world.meshes if mesh.dynamic == (kind == "dynamic") and len(mesh.triangles)]
         if not meshes and (kind == "dynamic" or len(world.meshes)):
             continue
-        shown = [_opaque_triangles(mesh, opaque) for mesh in meshes]
-        key = content_hash(({"frame": frame}, [mesh.positions for mesh in meshes], shown))
+        shown = [_opaque(mesh, opaque) for mesh in meshes]
+        reflectance = [mesh.reflectance[rows] for mesh, rows in zip(meshes, shown, strict=True)]
+        triangles = [mesh.triangles[rows] for mesh, rows in zip(meshes, shown, strict=True)]
+        key = content_hash(({"frame": frame}, [mesh.positions for mesh in meshes], triangles, reflectance))
 
-        def build(kind: str = kind, meshes: Sequence[Mesh] = meshes, shown: Sequence[np.ndarray] = shown) -> GpuTree:
-            places = _places(meshes, shown, frame)
-            return builder.voxelize.build(places, frame.depth, builder.buffers[kind])
+        def build(
+            kind: str = kind,
+            meshes: Sequence[Mesh] = meshes,
+            triangles: Sequence[np.ndarray] = triangles,
+            reflectance: Sequence[Float32] = reflectance,
+        ) -> tuple[GpuTree, GpuBrickLists]:
+            colours = np.concatenate([np.zeros((0, 3), np.float32), *reflectance])
+            return builder.build(kind, _places(meshes, triangles, frame), colours, frame.depth)
 
-        trees.append(kept.get(f"{kind}_octree", key, build))
+        built.append(kept.get(f"{kind}_octree", key, build))
         keys.append(key)
-    buffer = trees[0].buffer
-    if len(trees) > 1:
-        target = builder.buffers["joined"]
-        buffer = kept.get("joined_octree", " ".join(keys), lambda: builder.voxelize.join(trees, target))
-    return SceneOctree(buffer, frame, tuple(trees), builder.nbytes)
+    buffers = built[0][0].buffer, built[0][1].buffer
+    if len(built) > 1:
+        buffers = kept.get("joined_octree", " ".join(keys), lambda: builder.joined(built))
+    trees, lists = zip(*built, strict=True)
+    return SceneOctree(*buffers, frame, trees, lists, builder.nbytes)
 
 
-def _opaque_triangles(mesh: Mesh, opaque: np.ndarray) -> np.ndarray:
-    return mesh.triangles[opaque[mesh.material_indices]] if len(opaque) else mesh.triangles
+def _opaque(mesh: Mesh, opaque: np.ndarray) -> np.ndarray:
+    """(t,) which triangles stand in the way."""
+    return opaque[mesh.material_indices] if len(opaque) else np.ones(len(mesh.triangles), bool)
 
 
-def _places(meshes: Sequence[Mesh], shown: Sequence[np.ndarray], frame: VoxelFrame) -> Float64:
+def _places(meshes: Sequence[Mesh], triangles: Sequence[np.ndarray], frame: VoxelFrame) -> Float64:
     """(t, 3, 3) corners in voxel coordinates; rounding may have moved those on the bounds by a hair, never outside."""
-    parts = [frame.voxels(mesh.positions)[triangles] for mesh, triangles in zip(meshes, shown, strict=True)]
+    parts = [frame.voxels(mesh.positions)[shown] for mesh, shown in zip(meshes, triangles, strict=True)]
     return np.concatenate(parts) if parts else np.zeros((0, 3, 3))

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from ...core.brick_triangles import lattice_step
 from ...core.errors import DeviceError
 from ...core.scene import Float32, Float64
 from ...core.voxel_octree import BRICK_LEVELS, MOST_NODES, VoxelOctree, require_places, starting_blocks
@@ -29,6 +30,7 @@ from ..buffer_pool import BufferPool
 from ..growing_buffer import GrowingBuffer, require_block
 from ..prefix_sum import INVOCATIONS, PrefixSum, run_for_each
 from ..shader_library import ShaderLibrary, set_uniforms
+from .brick_lists import BrickListPass, BrickPairs, GpuBrickLists
 
 if TYPE_CHECKING:
     import moderngl
@@ -44,11 +46,6 @@ HEADER_WORDS = 8
 MOST_TREES = 2
 # Bytes: of one triangle, and of a block and its mask.
 _TRIANGLE_BYTES, _BLOCK_BYTES = 48, 8
-
-
-def lattice_step(depth: int) -> float:
-    """Coordinates from 0 to 2^depth are multiples of this on the device: differences of two are exact in float32."""
-    return 2.0 ** float(depth - 24)
 
 
 def growth_of(depth: int) -> float:
@@ -125,6 +122,7 @@ class VoxelizePass:
         self._spread = {last: shader("spread", LAST=last) for last in (False, True)}
         self._bricks, self._levels, self._count = shader("bricks"), shader("levels"), shader("count")
         self._nodes, self._clear = shader("nodes"), shader("clear")
+        self._lists = BrickListPass(context, shaders, self.pool, self._sum)
 
     def build(self, places: Float64, depth: int, target: GrowingBuffer) -> GpuTree:
         """The octree of (t, 3, 3) corners in voxel coordinates, in `target`'s buffer.
@@ -132,26 +130,46 @@ class VoxelizePass:
         depth: 2^depth voxels along each axis. Raises InvalidInput for corners outside the voxels, DeviceError where
         the device has no block for the lists or the tree, or nodes are more than a word can name.
         """
+        with ExitStack() as stack:
+            return self._build(stack, places, depth, target)[0]
+
+    def build_with_lists(
+        self, places: Float64, reflectance: Float32, depth: int, target: GrowingBuffer, list_target: GrowingBuffer
+    ) -> tuple[GpuTree, GpuBrickLists]:
+        """As `build`, and the triangles of each brick in `list_target`'s buffer. reflectance: (t, 3)."""
+        with ExitStack() as stack:
+            tree, pairs = self._build(stack, places, depth, target)
+            records = np.zeros((len(places), 4, 4), np.float32)
+            records[:, :3], records[:, 3, :3] = triangle_records(places, depth), reflectance
+            return tree, self._lists.fill(pairs, tree.brick_count, records, list_target)
+
+    def _build(
+        self, stack: ExitStack, places: Float64, depth: int, target: GrowingBuffer
+    ) -> tuple[GpuTree, BrickPairs]:
         require_places(places, depth)
         layout = _layout(depth)
-        with ExitStack() as stack:
-            bits, ranks = self._take(stack, 4 * layout.words), self._take(stack, 4 * (layout.words + 1))
-            self._zero(bits, 0, layout.words)
-            require_block(self._context, _TRIANGLE_BYTES * len(places), "voxelisation")
-            triangles = stack.enter_context(self.pool.uploaded(triangle_records(places, depth)))
-            pairs, pair_count = self._brick_pairs(stack, places, triangles, bits, layout)
-            self._link_levels(bits, ranks, layout)
-            tree = self._allocated(ranks, layout, target)
-            self._write_nodes(tree, bits, ranks, layout)
-            _bind(TRIANGLE=triangles, BLOCK=pairs)
-            values = {
-                "block_count": pair_count,
-                "growth": growth_of(depth),
-                "brick_word": layout.starts[layout.brick_level],
-                "first_brick": HEADER_WORDS + tree.node_count,
-            }
-            self._run(self._bricks, pair_count, values)
-            return tree
+        bits, ranks = self._take(stack, 4 * layout.words), self._take(stack, 4 * (layout.words + 1))
+        self._zero(bits, 0, layout.words)
+        require_block(self._context, _TRIANGLE_BYTES * len(places), "voxelisation")
+        triangles = stack.enter_context(self.pool.uploaded(triangle_records(places, depth)))
+        pairs, pair_count = self._brick_pairs(stack, places, triangles, bits, layout)
+        self._link_levels(bits, ranks, layout)
+        tree = self._allocated(ranks, layout, target)
+        self._write_nodes(tree, bits, ranks, layout)
+        _bind(TRIANGLE=triangles, BLOCK=pairs)
+        brick_word = layout.starts[layout.brick_level]
+        values = {
+            "block_count": pair_count,
+            "growth": growth_of(depth),
+            "brick_word": brick_word,
+            "first_brick": HEADER_WORDS + tree.node_count,
+        }
+        self._run(self._bricks, pair_count, values)
+        return tree, BrickPairs(pairs, pair_count, bits, ranks, brick_word)
+
+    def join_lists(self, lists: Sequence[GpuBrickLists], target: GrowingBuffer) -> moderngl.Buffer:
+        """A buffer with copies of the triangles of one or two trees, in the order of `join`."""
+        return self._lists.join(lists, target)
 
     def join(self, trees: Sequence[GpuTree], target: GrowingBuffer) -> moderngl.Buffer:
         """A buffer with copies of one or two trees of the same depth, for lib/octree.glsl to look at both."""
