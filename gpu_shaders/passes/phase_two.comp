@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Irradiance of every pixel from a run of virtual lights, added to what earlier runs gave (seed 002, 3.3 and eq. 3.1):
-// of all lights, or (LISTED) of the list of the pixel's tile, each with the weight of its cluster's window.
+// of all lights, or (LISTED) of the list of the pixel's tile, each with the weight of its cluster's window. Or (PICKS)
+// some of these lights.
 // A work group shades a tile of pixels and sorts the lights into classes that hold for all of the tile.
 #include "gpu_layout/VirtualLight"
 #define TILE_ACCESS readonly
 #include "passes/tile_pixels.glsl"
 #include "passes/tile_lists.glsl"
+#include "passes/light_sum.glsl"
 #include "lib/light_cluster.glsl"
 
 #define CLASSES 3
@@ -21,14 +23,8 @@ layout(std430, binding = LIGHT_WINDOW_BINDING) readonly buffer LightWindows { ve
 #define WEIGHT(LIGHT, POINT) 1.0
 #endif
 
-layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²
-
 // One bit for each light of a batch, by class.
 shared uint members[CLASSES * WORDS];
-
-vec3 sums[PIXELS];
-// Of one batch of lights, added to `sums` at its end: a plain sum over 100,000 lights would lose digits.
-vec3 batch_sums[PIXELS];
 
 // Sorts the GROUP_SIZE lights from `first` on into `members`, one for each invocation.
 void classify(PointGroup group, uint first, uint end) {
@@ -61,7 +57,7 @@ void classify(PointGroup group, uint first, uint end) {
             for (int k = 0; k < PIXELS; ++k) { \
                 float factor = WEIGHT(i, positions[k]) * FORM_FACTOR; \
                 bool is_own = light.tag_id != UNTAGGED && light.tag_id == tag_ids[k]; \
-                batch_sums[k] += is_own ? vec3(0.0) : factor * radiosity; \
+                meet(k, i, is_own ? vec3(0.0) : factor * radiosity); \
             } \
         } \
     }
@@ -74,14 +70,10 @@ void main() {
         return;
     }
     fetch_pixels(tile);
-    for (int k = 0; k < PIXELS; ++k) {
-        sums[k] = vec3(0.0);
-    }
+    start_sums(tile);
     for (uint first = run.x; first < run.y; first += GROUP_SIZE) {
         classify(group, first, run.y);
-        for (int k = 0; k < PIXELS; ++k) {
-            batch_sums[k] = vec3(0.0);
-        }
+        start_batch();
         ADD_MEMBERS(LIGHT_IS_FAR,
             far_form_factor(positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector))
         ADD_MEMBERS(LIGHT_IS_WHOLE,
@@ -90,15 +82,8 @@ void main() {
         ADD_MEMBERS(LIGHT_IS_CLIPPED,
             triangle_form_factor(
                 positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius))
-        for (int k = 0; k < PIXELS; ++k) {
-            sums[k] += batch_sums[k];
-        }
+        end_batch();
         barrier();
     }
-    for (int k = 0; k < PIXELS; ++k) {
-        if (shown[k]) {
-            ivec2 pixel = pixel_at(tile, k);
-            imageStore(irradiance, pixel, vec4(imageLoad(irradiance, pixel).rgb + sums[k], 1.0));
-        }
-    }
+    store_sums(tile);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Irradiance of every pixel from the clusters in the list of its tile, each with its weight there, added to what
-// earlier lists gave.
+// earlier lists gave. Or (PICKS) some of these clusters.
 #define TILE_ACCESS readonly
 #include "passes/tile_pixels.glsl"
 #include "passes/tile_lists.glsl"
+#include "passes/light_sum.glsl"
 #include "lib/light_cluster.glsl"
 
 #define WORDS (GROUP_SIZE / 32)
@@ -11,13 +12,8 @@
 layout(std430, binding = LIGHT_NODE_BINDING) readonly buffer LightNodes { LightNode nodes[]; };
 layout(std430, binding = LIGHT_CLUSTER_BINDING) readonly buffer LightClusters { LightCluster clusters[]; };
 
-layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²
-
 // One bit for each cluster of a batch that may light the tile.
 shared uint members[WORDS];
-
-vec3 sums[PIXELS];
-vec3 batch_sums[PIXELS];
 
 void classify(PointGroup group, uint first, uint end) {
     uint index = gl_LocalInvocationIndex;
@@ -45,14 +41,10 @@ void main() {
     }
     PointGroup group = tiles[tile];
     fetch_pixels(tile);
-    for (int k = 0; k < PIXELS; ++k) {
-        sums[k] = vec3(0.0);
-    }
+    start_sums(tile);
     for (uint first = run.x; first < run.y; first += GROUP_SIZE) {
         classify(group, first, run.y);
-        for (int k = 0; k < PIXELS; ++k) {
-            batch_sums[k] = vec3(0.0);
-        }
+        start_batch();
         for (int word = 0; word < WORDS; ++word) {
             uint bits = members[word];
             while (bits != 0u) {
@@ -64,19 +56,12 @@ void main() {
                     float factor = cluster_weight(node, cluster, positions[k])
                         * cluster_factor(node, cluster, positions[k], normals[k]);
                     bool is_own = cluster.tag_id != UNTAGGED && cluster.tag_id == tag_ids[k];
-                    batch_sums[k] += is_own ? vec3(0.0) : factor * cluster.power;
+                    meet(k, PICKED_CLUSTER | i, is_own ? vec3(0.0) : factor * cluster.power);
                 }
             }
         }
-        for (int k = 0; k < PIXELS; ++k) {
-            sums[k] += batch_sums[k];
-        }
+        end_batch();
         barrier();
     }
-    for (int k = 0; k < PIXELS; ++k) {
-        if (shown[k]) {
-            ivec2 pixel = pixel_at(tile, k);
-            imageStore(irradiance, pixel, vec4(imageLoad(irradiance, pixel).rgb + sums[k], 1.0));
-        }
-    }
+    store_sums(tile);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Irradiance of every pixel from the lights in the list of its cell of a light grid (seed 002, 4.3), added to what other
-// grids gave. A pixel outside the grid gets the lights whose active hemisphere holds it.
+// grids gave. A pixel outside the grid gets the lights whose active hemisphere holds it. Or (PICKS) some of these lights.
 #include "gpu_layout/VirtualLight"
 #define TILE_ACCESS readonly
 #include "passes/tile_pixels.glsl"
+#include "passes/light_sum.glsl"
 #include "lib/active_hemisphere.glsl"
 #include "lib/block_lists.glsl"
 
@@ -16,8 +17,6 @@ layout(std430, binding = LIST_BINDING) readonly buffer Entries { uint entries[];
 layout(std430, binding = MASK_BINDING) readonly buffer Masks { uvec2 masks[]; };
 layout(std430, binding = HALF_BALL_BINDING) readonly buffer HalfBalls { HalfBall half_balls[]; };
 
-layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²
-
 // Of the grid's frame: places are frame_scale times a position plus frame_offset.
 uniform float frame_scale;
 uniform vec3 frame_offset;
@@ -29,22 +28,29 @@ uniform uint light_count;
 uniform uint first_entry;
 uniform uint end_entry;
 
-vec3 light_at(uint i, int k) {
+void meet_light(uint i, int k) {
     VirtualLight light = lights[i];
     bool is_own = light.tag_id != UNTAGGED && light.tag_id == tag_ids[k];
     float factor = triangle_form_factor(
         positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius);
-    return is_own ? vec3(0.0) : factor * radiosities[i].rgb;
+    meet(k, i, is_own ? vec3(0.0) : factor * radiosities[i].rgb);
+}
+
+// After the `found`th light.
+void end_full_batch(uint found) {
+    if (found % BATCH == 0u) {
+        end_batch();
+        start_batch();
+    }
 }
 
 // Looks for the next light of its own before it computes one, so that invocations that run in step compute together
 // though they find theirs at different places.
-vec3 sum_of_cell(vec3 place, int k) {
+void meet_cell(vec3 place, int k) {
     uvec3 cell = cell_of(place, low, high, cells);
     uint block = block_of(cell, cells);
     uint start = list_offsets[block], stop = list_offsets[block + 1u];
     uint end = min(start + end_entry, stop);
-    vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
     uint i = min(start + first_entry, stop);
     for (uint found = 1u; ; ++found) {
         while (i < end && !has_cell(masks[i], cell)) {
@@ -53,14 +59,10 @@ vec3 sum_of_cell(vec3 place, int k) {
         if (i >= end) {
             break;
         }
-        batch_sum += light_at(entries[i], k);
+        meet_light(entries[i], k);
         ++i;
-        if (found % BATCH == 0u) {
-            sum += batch_sum;
-            batch_sum = vec3(0.0);
-        }
+        end_full_batch(found);
     }
-    return sum + batch_sum;
 }
 
 bool holds(HalfBall half_ball, vec3 place) {
@@ -68,9 +70,8 @@ bool holds(HalfBall half_ball, vec3 place) {
     return may_overlap(half_ball, place - half_ball.centre, place - half_ball.centre);
 }
 
-vec3 sum_outside(vec3 place, int k) {
+void meet_outside(vec3 place, int k) {
     uint end = min(end_entry, light_count);
-    vec3 sum = vec3(0.0), batch_sum = vec3(0.0);
     uint i = first_entry;
     for (uint found = 1u; ; ++found) {
         while (i < end && !holds(half_balls[i], place)) {
@@ -79,14 +80,10 @@ vec3 sum_outside(vec3 place, int k) {
         if (i >= end) {
             break;
         }
-        batch_sum += light_at(i, k);
+        meet_light(i, k);
         ++i;
-        if (found % BATCH == 0u) {
-            sum += batch_sum;
-            batch_sum = vec3(0.0);
-        }
+        end_full_batch(found);
     }
-    return sum + batch_sum;
 }
 
 void main() {
@@ -95,14 +92,20 @@ void main() {
         return;
     }
     fetch_pixels(tile);
+    start_sums(tile);
     for (int k = 0; k < PIXELS; ++k) {
         if (shown[k]) {
             vec3 place = frame_scale * positions[k] + frame_offset;
             // What lies on the grid's face does not leave it by rounding.
             bool is_inside = all(greaterThanEqual(place, low - FACE_SLACK)) && all(lessThanEqual(place, high + FACE_SLACK));
-            vec3 sum = is_inside ? sum_of_cell(place, k) : sum_outside(place, k);
-            ivec2 pixel = pixel_at(tile, k);
-            imageStore(irradiance, pixel, vec4(imageLoad(irradiance, pixel).rgb + sum, 1.0));
+            start_batch();
+            if (is_inside) {
+                meet_cell(place, k);
+            } else {
+                meet_outside(place, k);
+            }
+            end_batch();
         }
     }
+    store_sums(tile);
 }

@@ -12,6 +12,7 @@ from ..gpu_layout import CONSTANTS
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
+from .light_picks import PICK_DEFINES, LightPicks
 from .tile_bounds import TILE_BINDING, TILE_DEFINES, TileBoundsPass, Tiles
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ MIN_LIGHTS_PER_DISPATCH = 64
 # Mesa's software renderers end all loops of an invocation after 65,535 iterations together, without a word; a light
 # takes one, and one more for each pixel of the invocation.
 MAX_LIGHTS_PER_DISPATCH = 8192
-PHASE_TWO_DEFINES = {**TILE_DEFINES, "UNTAGGED": UNTAGGED}
+PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, "UNTAGGED": UNTAGGED, "PICKS": False}
 
 
 class IrradianceImage:
@@ -41,14 +42,18 @@ class IrradianceImage:
         self.texture.bind_to_image(0)
 
 
+_DEFINES = {**PHASE_TWO_DEFINES, "LISTED": False}
+
+
 class PhaseTwoPass:
     """The sum over all lights of radiosity times form factor (seed 002, eq. 3.1 and 3.3)."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
         self._context = context
+        self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        self._shader = shaders.compute("passes/phase_two.comp", {**PHASE_TWO_DEFINES, "LISTED": False})
+        self._shader = shaders.compute("passes/phase_two.comp", _DEFINES)
 
     def render(
         self, gbuffer: GBuffer, lights: GpuVirtualLights, radiosity: moderngl.Buffer, progress: Progress
@@ -58,16 +63,41 @@ class PhaseTwoPass:
         radiosity: one vec4 a light, rgb in W/m². Lights and surfaces of the same non-zero tag id leave each other
         out. `progress` hears of each dispatch and may cancel. The next call overwrites the texture.
         """
-        tiles = self._tile_bounds.render(gbuffer)
         self._irradiance.clear()
+        self._walk(self._shader, MAX_LIGHTS_PER_DISPATCH, gbuffer, lights, radiosity, progress)
+        return self._irradiance.texture
+
+    def pick(
+        self,
+        picks: LightPicks,
+        gbuffer: GBuffer,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        progress: Progress,
+    ) -> None:
+        """Fills `picks` from the lights that the last `render` added up, with its arguments."""
+        shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **picks.defines})
+        picks.begin(shader, self._irradiance.texture)
+        self._walk(shader, picks.per_dispatch(MAX_LIGHTS_PER_DISPATCH), gbuffer, lights, radiosity, progress)
+
+    def _walk(
+        self,
+        shader: moderngl.ComputeShader,
+        most: int,
+        gbuffer: GBuffer,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        progress: Progress,
+    ) -> None:
+        """most: lights of a dispatch."""
+        tiles = self._tile_bounds.render(gbuffer)
         bind_lights(tiles, lights, radiosity)
         width, height = tiles.size
-        for first, end in entry_runs(lights.count, width * height):
-            set_uniforms(self._shader, {**tiles.uniforms(), "first_entry": first, "end_entry": end})
-            self._shader.run(*tiles.grid)
+        for first, end in entry_runs(lights.count, width * height, most):
+            set_uniforms(shader, {**tiles.uniforms(), "first_entry": first, "end_entry": end})
+            shader.run(*tiles.grid)
             self._context.memory_barrier()
             step(progress, end / lights.count, "phase two")
-        return self._irradiance.texture
 
 
 def bind_lights(tiles: Tiles, lights: GpuVirtualLights, radiosity: moderngl.Buffer) -> None:

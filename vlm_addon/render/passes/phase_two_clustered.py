@@ -11,6 +11,7 @@ from ..light_forest import GpuLightForest
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
+from .light_picks import LightPicks
 from .phase_two import MAX_LIGHTS_PER_DISPATCH, PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
 from .tile_bounds import TILE_SIDE, TileBoundsPass, Tiles
 from .tile_walk import (
@@ -49,12 +50,12 @@ class ClusteredPhaseTwoPass:
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
         self._context = context
+        self._shaders = shaders
         self._pool = BufferPool(context)
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
         self._walk = TileWalkPass(context, shaders, self._pool)
-        self._lights = shaders.compute("passes/phase_two.comp", _DEFINES)
-        self._clusters = shaders.compute("passes/phase_two_clusters.comp", _DEFINES)
+        self._sums = _of_both(shaders, {})
         self.entries = 0
         self.tiles = 0
 
@@ -78,12 +79,34 @@ class ClusteredPhaseTwoPass:
         self.tiles += len(shown)
         for share, lists in self._walk.lists(tiles, shown, forest):
             self.entries += lists.count
-            self._add(tiles, lists, gbuffer, lights, radiosity, forest)
+            self._irradiance.texture.bind_to_image(0)
+            self._meet(self._sums[lists.of_lights], _most(lists), tiles, lists, gbuffer, lights, radiosity, forest)
             step(progress, share, "phase two")
         return self._irradiance.texture
 
-    def _add(
+    def pick(
         self,
+        picks: LightPicks,
+        gbuffer: GBuffer,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        forest: GpuLightForest,
+        progress: Progress,
+    ) -> None:
+        """As PhaseTwoPass.pick; picks may be clusters, as rows of `forest.nodes`."""
+        both = _of_both(self._shaders, picks.defines)
+        tiles = self._tile_bounds.render(gbuffer)
+        picks.begin(both[False], self._irradiance.texture)
+        for share, lists in self._walk.lists(tiles, tiles.shown(), forest):
+            shader, most = both[lists.of_lights], picks.per_dispatch(_most(lists))
+            picks.bind(shader, self._irradiance.texture)
+            self._meet(shader, most, tiles, lists, gbuffer, lights, radiosity, forest)
+            step(progress, share, "phase two")
+
+    def _meet(
+        self,
+        shader: moderngl.ComputeShader,
+        most: int,
         tiles: Tiles,
         lists: TileLists,
         gbuffer: GBuffer,
@@ -91,10 +114,8 @@ class ClusteredPhaseTwoPass:
         radiosity: moderngl.Buffer,
         forest: GpuLightForest,
     ) -> None:
-        """Adds what is in `lists`."""
-        shader = self._lights if lists.of_lights else self._clusters
+        """Lets `shader` meet what is in `lists`. most: entries of a dispatch."""
         gbuffer.bind()
-        self._irradiance.texture.bind_to_image(0)
         with (
             self._pool.uploaded(lists.offsets.astype("<u4")) as offsets,
             self._pool.uploaded(lists.tiles) as list_tiles,
@@ -108,8 +129,17 @@ class ClusteredPhaseTwoPass:
             else:
                 forest.nodes.bind_to_storage_buffer(LIGHT_NODE_BINDING)
                 forest.clusters.bind_to_storage_buffer(LIGHT_CLUSTER_BINDING)
-            most = MAX_LIGHTS_PER_DISPATCH if lists.of_lights else MAX_CLUSTERS_PER_DISPATCH
             for first, end in entry_runs(lists.longest, len(lists.tiles) * TILE_SIDE**2, most):
                 set_uniforms(shader, {**tiles.uniforms(), "first_entry": first, "end_entry": end})
                 shader.run(len(lists.tiles))
                 self._context.memory_barrier()
+
+
+def _of_both(shaders: ShaderLibrary, defines: dict[str, int | bool]) -> dict[bool, moderngl.ComputeShader]:
+    """Shaders for lists of clusters (False) and of lights (True)."""
+    files = {False: "passes/phase_two_clusters.comp", True: "passes/phase_two.comp"}
+    return {of_lights: shaders.compute(file, {**_DEFINES, **defines}) for of_lights, file in files.items()}
+
+
+def _most(lists: TileLists) -> int:
+    return MAX_LIGHTS_PER_DISPATCH if lists.of_lights else MAX_CLUSTERS_PER_DISPATCH

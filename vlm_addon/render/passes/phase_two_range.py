@@ -18,6 +18,7 @@ from ..shader_library import ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
 from .light_grid import GpuBlockLists
+from .light_picks import LightPicks
 from .phase_two import PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
 from .tile_bounds import TileBoundsPass
 from .tile_walk import LIST_BINDING, LIST_OFFSET_BINDING
@@ -32,6 +33,14 @@ _HALF_BALL_BINDING = 6
 _MOST_PER_RUN = 1024
 FACE_SLACK = 1e-5
 """How far outside a grid of side 1 a point counts as on its face: some hundred roundings of a position."""
+_DEFINES: dict[str, int | float | str] = {
+    **PHASE_TWO_DEFINES,
+    "LIST_BINDING": LIST_BINDING,
+    "LIST_OFFSET_BINDING": LIST_OFFSET_BINDING,
+    "MASK_BINDING": _MASK_BINDING,
+    "HALF_BALL_BINDING": _HALF_BALL_BINDING,
+    "FACE_SLACK": FACE_SLACK,
+}
 
 
 @dataclass(frozen=True)
@@ -58,17 +67,10 @@ class RangePhaseTwoPass:
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
         self._context = context
+        self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        defines = {
-            **PHASE_TWO_DEFINES,
-            "LIST_BINDING": LIST_BINDING,
-            "LIST_OFFSET_BINDING": LIST_OFFSET_BINDING,
-            "MASK_BINDING": _MASK_BINDING,
-            "HALF_BALL_BINDING": _HALF_BALL_BINDING,
-            "FACE_SLACK": FACE_SLACK,
-        }
-        self._shader = shaders.compute("passes/phase_two_range.comp", defines)
+        self._shader = shaders.compute("passes/phase_two_range.comp", _DEFINES)
 
     def render(
         self,
@@ -81,8 +83,41 @@ class RangePhaseTwoPass:
         progress: Progress,
     ) -> moderngl.Texture:
         """As PhaseTwoPass.render. space: of the G-buffer and of `lights`. bounds: of the visible scene, world space."""
-        tiles = self._tile_bounds.render(gbuffer)
         self._irradiance.clear()
+        self._walk(self._shader, _MOST_PER_RUN, gbuffer, lights, radiosity, grids, space, bounds, progress)
+        return self._irradiance.texture
+
+    def pick(
+        self,
+        picks: LightPicks,
+        gbuffer: GBuffer,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        grids: Sequence[GpuRangeGrid],
+        space: LocalSpace,
+        bounds: Bounds,
+        progress: Progress,
+    ) -> None:
+        """As PhaseTwoPass.pick."""
+        shader = self._shaders.compute("passes/phase_two_range.comp", {**_DEFINES, **picks.defines})
+        picks.begin(shader, self._irradiance.texture)
+        most = picks.per_dispatch(_MOST_PER_RUN)
+        self._walk(shader, most, gbuffer, lights, radiosity, grids, space, bounds, progress)
+
+    def _walk(
+        self,
+        shader: moderngl.ComputeShader,
+        most_per_run: int,
+        gbuffer: GBuffer,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        grids: Sequence[GpuRangeGrid],
+        space: LocalSpace,
+        bounds: Bounds,
+        progress: Progress,
+    ) -> None:
+        """most_per_run: lights of a dispatch."""
+        tiles = self._tile_bounds.render(gbuffer)
         width, height = tiles.size
         for done, grid in enumerate(grids):
             bind_lights(tiles, lights, radiosity)
@@ -90,15 +125,14 @@ class RangePhaseTwoPass:
             grid.lists.light_ids.bind_to_storage_buffer(LIST_BINDING)
             grid.lists.masks.bind_to_storage_buffer(_MASK_BINDING)
             grid.half_balls.bind_to_storage_buffer(_HALF_BALL_BINDING)
-            set_uniforms(self._shader, {**tiles.uniforms(), **_frame_uniforms(grid, space)})
+            set_uniforms(shader, {**tiles.uniforms(), **_frame_uniforms(grid, space)})
             # Points outside look through all lights.
             most = grid.longest if _holds(grid.frame, bounds) else max(grid.longest, grid.light_count)
-            for first, end in entry_runs(most, width * height, _MOST_PER_RUN):
-                set_uniforms(self._shader, {"first_entry": first, "end_entry": end})
-                self._shader.run(*tiles.grid)
+            for first, end in entry_runs(most, width * height, most_per_run):
+                set_uniforms(shader, {"first_entry": first, "end_entry": end})
+                shader.run(*tiles.grid)
                 self._context.memory_barrier()
                 step(progress, (done + end / most) / len(grids), "phase two")
-        return self._irradiance.texture
 
 
 def _holds(frame: GridFrame, bounds: Bounds) -> bool:
