@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Takes the pattern of interleaved sampling out of a picture without blurring over edges (seed 004, 4.12; Laine et al.
 // 2007). Pixels that are the same modulo INTERLEAVE in both directions are of one class: they used the same lights. A
-// pixel gets the mean over the classes of what each has nearby on the same surface: so every class weighs the same, and
-// as they are always added in the same order, an even surface comes out even to the last bit.
+// pixel gets the mean over the classes of what each has nearby on the same surface, moved back to the pixel along the
+// slope where that is on one side of it. So every class weighs the same, and as they are always added in the same order,
+// an even surface comes out even to the last bit.
 #include "passes/gbuffer_samplers.glsl"
 
 layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
@@ -43,49 +44,93 @@ bool is_one_surface(Place a, Place b) {
         && abs(dot(way, a.geometric_normal)) <= a.reach && abs(dot(way, b.geometric_normal)) <= b.reach;
 }
 
-// Mean over the members of a class in the square of 2 INTERLEAVE + 1 pixels around one: those within half of that, or,
-// (is_far) the others. step: from the pixel to a member, 0 to INTERLEAVE - 1. found: whether there is one that counts.
-vec4 class_mean(ivec2 pixel, Place place, ivec2 step, bool is_far, out bool found) {
-    ivec2 size = textureSize(values, 0);
-    vec4 mean = vec4(0.0);
-    float count = 0.0;
-    for (int k = 0; k < 9; ++k) {
+// Whether the pixel at an offset counts for one, and its value.
+bool counts(ivec2 pixel, Place place, ivec2 offset, out vec4 value) {
+    ivec2 other = pixel + offset;
+    value = vec4(0.0);
+    if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, textureSize(values, 0)))) {
+        return false;
+    }
+    value = texelFetch(values, other, 0);
+    return is_usable(value) && (offset == ivec2(0) || is_one_surface(place, place_of(other)));
+}
+
+struct ClassMean {
+    vec4 value;
+    vec2 offset;    // sum of the members' offsets, pixels; whole numbers, so that it is 0 where they lie around the pixel
+    float count;    // of members
+    vec4 lowest;    // of 0 and all members' values
+};
+
+void add_member(ivec2 pixel, Place place, ivec2 offset, inout ClassMean mean) {
+    vec4 value;
+    if (counts(pixel, place, offset, value)) {
+        // Not a sum over a count: what is the same for all is the mean, unrounded.
+        mean.count += 1.0;
+        mean.value += (value - mean.value) / mean.count;
+        mean.offset += vec2(offset);
+        mean.lowest = min(mean.lowest, value);
+    }
+}
+
+// Mean over the members of a class within INTERLEAVE / 2 of a pixel, or, where none of those counts, within INTERLEAVE.
+// step: from the pixel to a member, 0 to INTERLEAVE - 1. Loops that some pixels need and others not have no turns where
+// they are not needed: software renderers run both sides of every branch.
+ClassMean class_mean(ivec2 pixel, Place place, ivec2 step) {
+    ClassMean mean = ClassMean(vec4(0.0), vec2(0.0), 0.0, vec4(0.0));
+    ivec2 nearest = step - INTERLEAVE * ivec2(greaterThanEqual(2 * step, ivec2(INTERLEAVE)));
+    ivec2 side = 1 + ivec2(equal(2 * step, ivec2(INTERLEAVE)));
+    for (int k = 0; k < side.x * side.y; ++k) {
+        add_member(pixel, place, nearest + INTERLEAVE * ivec2(k % side.x, k / side.x), mean);
+    }
+    for (int k = mean.count > 0.0 ? 9 : 0; k < 9; ++k) {
         ivec2 offset = step + INTERLEAVE * (ivec2(k % 3, k / 3) - 1);
-        ivec2 other = pixel + offset;
         int farthest = max(abs(offset.x), abs(offset.y));
-        bool is_inside = all(greaterThanEqual(other, ivec2(0))) && all(lessThan(other, size));
-        if (!is_inside || farthest > INTERLEAVE || (2 * farthest > INTERLEAVE) != is_far) {
-            continue;
-        }
-        vec4 value = texelFetch(values, other, 0);
-        if (is_usable(value) && (farthest == 0 || is_one_surface(place, place_of(other)))) {
-            // Not a sum over a count: what is the same for all is the mean, unrounded.
-            count += 1.0;
-            mean += (value - mean) / count;
+        if (farthest <= INTERLEAVE && 2 * farthest > INTERLEAVE) {
+            add_member(pixel, place, offset, mean);
         }
     }
-    found = count > 0.0;
     return mean;
+}
+
+// How much the values grow for a pixel along an axis, a unit vector: the mean over pairs of one class, which used the
+// same lights, so that the pattern is no part of it. 0 where there is no pair, or where it is not needed.
+vec4 slope_along(ivec2 pixel, Place place, ivec2 axis, bool is_needed) {
+    vec4 sum = vec4(0.0);
+    float count = 0.0;
+    for (int along = is_needed ? -INTERLEAVE : 1; along <= 0; ++along) {
+        for (int across = -(INTERLEAVE / 2); across <= INTERLEAVE / 2; ++across) {
+            ivec2 first = along * axis + across * (1 - axis);
+            vec4 from, to;
+            if (counts(pixel, place, first, from) && counts(pixel, place, first + INTERLEAVE * axis, to)) {
+                sum += to - from;
+                count += 1.0;
+            }
+        }
+    }
+    return sum / (max(count, 1.0) * float(INTERLEAVE));
 }
 
 vec4 mean_of_classes(ivec2 pixel) {
     Place place = place_of(pixel);
-    vec4 sum = vec4(0.0);
+    vec4 sum = vec4(0.0), lowest = vec4(0.0);
+    vec2 offset = vec2(0.0);
     float total = 0.0;
     for (int k = 0; k < INTERLEAVE * INTERLEAVE; ++k) {
         ivec2 residue = ivec2(k % INTERLEAVE, k / INTERLEAVE);
         ivec2 step = (residue - pixel % INTERLEAVE + INTERLEAVE) % INTERLEAVE;
-        bool found;
-        vec4 mean = class_mean(pixel, place, step, false, found);
-        if (!found) {
-            mean = class_mean(pixel, place, step, true, found);
-        }
-        if (found) {
-            sum += mean;
+        ClassMean mean = class_mean(pixel, place, step);
+        if (mean.count > 0.0) {
+            sum += mean.value;
+            offset += mean.offset / mean.count;
             total += 1.0;
+            lowest = min(lowest, mean.lowest);
         }
     }
-    return total > 0.0 ? sum / total : vec4(0.0);
+    // Where more counted on one side, the mean is that of a place beside the pixel.
+    vec4 aside = offset.x * slope_along(pixel, place, ivec2(1, 0), offset.x != 0.0)
+        + offset.y * slope_along(pixel, place, ivec2(0, 1), offset.y != 0.0);
+    return total > 0.0 ? max((sum - aside) / total, lowest) : vec4(0.0);
 }
 
 void main() {

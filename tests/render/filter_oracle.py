@@ -23,29 +23,73 @@ def shifted(image: np.ndarray, dx: int, dy: int, fill: float) -> np.ndarray:
     return result
 
 
-def filtered(
-    surface: Surface, values: np.ndarray, n: int, reach: Float64, least_cosine: float, rings: int = 2
-) -> Float64:
-    """(h, w, c) means of the classes' means. reach: (h, w), m, from each pixel's plane. rings: 1 without a second look
-    for classes that have nothing within n / 2."""
-    shown = surface[2].any(axis=2)
-    usable = np.isfinite(values).all(axis=2) & shown
-    safe = np.where(usable[..., None], values, 0.0).astype(float)
-    total, classes = np.zeros(safe.shape), np.zeros(shown.shape)
-    for members in _classes(n):
-        mean, missing = np.zeros(safe.shape), np.ones(shown.shape, bool)
-        for ring in range(rings):
-            sums, count = np.zeros(safe.shape), np.zeros(shown.shape)
-            for dx, dy in members[ring]:
-                one = _is_one_surface(surface, dx, dy, reach, least_cosine) & shifted(usable, dx, dy, False)
-                sums += np.where(one[..., None], shifted(safe, dx, dy, 0.0), 0.0)
-                count += one
-            found = missing & (count > 0)
-            mean[found] = sums[found] / count[found][:, None]
-            missing &= ~found
-        total += mean
-        classes += ~missing
-    return np.where((shown & (classes > 0))[..., None], total / np.maximum(classes, 1)[..., None], 0.0)
+class Neighbours:
+    """Who counts for whom, and their values. reach: (h, w), m, from each pixel's plane."""
+
+    def __init__(self, surface: Surface, values: np.ndarray, reach: Float64, least_cosine: float) -> None:
+        self._surface, self._reach, self._least_cosine = surface, reach, least_cosine
+        self.shown = surface[2].any(axis=2)
+        self._usable = np.isfinite(values).all(axis=2)
+        self._values = np.where(self._usable[..., None], values, 0.0).astype(float)
+
+    def at(self, dx: int, dy: int) -> tuple[np.ndarray, Float64]:
+        """(h, w, 1) whether the pixel there counts, (h, w, c) its value or 0."""
+        one = self._is_one_surface(dx, dy) & shifted(self._usable, dx, dy, False) & self.shown
+        return one[..., None], np.where(one[..., None], shifted(self._values, dx, dy, 0.0), 0.0)
+
+    def _is_one_surface(self, dx: int, dy: int) -> np.ndarray:
+        if (dx, dy) == (0, 0):
+            return self.shown
+        position, shading, geometric = self._surface
+        other_position, other_shading, other_geometric = (shifted(image, dx, dy, 0.0) for image in self._surface)
+        way = (other_position - position)[..., :3]
+        return (
+            other_geometric.any(axis=2)
+            & ((shading * other_shading).sum(axis=2) >= self._least_cosine)
+            & (abs((way * geometric).sum(axis=2)) <= self._reach)
+            & (abs((way * other_geometric).sum(axis=2)) <= shifted(self._reach, dx, dy, 0.0))
+        )
+
+
+def filtered(surface: Surface, values: np.ndarray, n: int, reach: Float64, least_cosine: float) -> Float64:
+    """(h, w, c) means of the classes' means, moved to the pixel's place. reach: (h, w), m, from each pixel's plane."""
+    neighbours = Neighbours(surface, values, reach, least_cosine)
+    height, width, channels = values.shape
+    total, lowest, classes = (np.zeros((height, width, count)) for count in (channels, channels, 1))
+    offsets = np.zeros((height, width, 2))
+    for near, far in _classes(n):
+        counted = np.zeros((height, width, 1), bool)
+        for ring in (near, far):
+            found = [(*neighbours.at(dx, dy), (dx, dy)) for dx, dy in ring]
+            count = sum(one.astype(float) for one, _, _ in found) if found else np.zeros((height, width, 1))
+            new = (count > 0) & ~counted
+            divisor = np.where(new, np.maximum(count, 1), np.inf)
+            for one, value, offset in found:
+                total += value / divisor
+                offsets += one * offset / divisor
+                lowest = np.minimum(lowest, np.where(one & new, value, 0.0))
+            counted |= new
+        classes += counted
+    mean = total / np.maximum(classes, 1)
+    for axis in range(2):
+        mean -= _slope(neighbours, n, axis) * offsets[..., axis : axis + 1] / np.maximum(classes, 1)
+    return np.maximum(mean, lowest)
+
+
+def _slope(neighbours: Neighbours, n: int, axis: int) -> Float64:
+    """(h, w, c) growth for each pixel to the right or down, of pairs n apart."""
+    pairs = [
+        (neighbours.at(*_turned(along, across, axis)), neighbours.at(*_turned(along + n, across, axis)))
+        for along in range(-n, 1)
+        for across in range(-(n // 2), n // 2 + 1)
+    ]
+    both = [(one & other, last - first) for (one, first), (other, last) in pairs]
+    count = sum(pair.astype(float) for pair, _ in both)
+    return sum(np.where(pair, difference, 0.0) for pair, difference in both) / np.maximum(count, 1) / n
+
+
+def _turned(along: int, across: int, axis: int) -> tuple[int, int]:
+    return (along, across) if axis == 0 else (across, along)
 
 
 def _classes(n: int) -> Iterator[tuple[list[tuple[int, int]], list[tuple[int, int]]]]:
@@ -55,17 +99,3 @@ def _classes(n: int) -> Iterator[tuple[list[tuple[int, int]], list[tuple[int, in
         of_class = [o for o in square if (o[0] % n, o[1] % n) == residue]
         near = [o for o in of_class if 2 * max(map(abs, o)) <= n]
         yield near, [o for o in of_class if o not in near]
-
-
-def _is_one_surface(surface: Surface, dx: int, dy: int, reach: Float64, least_cosine: float) -> np.ndarray:
-    if (dx, dy) == (0, 0):
-        return surface[2].any(axis=2)
-    position, shading, geometric = surface
-    other_position, other_shading, other_geometric = (shifted(image, dx, dy, 0.0) for image in surface)
-    way = (other_position - position)[..., :3]
-    return (
-        other_geometric.any(axis=2)
-        & ((shading * other_shading).sum(axis=2) >= least_cosine)
-        & (abs((way * geometric).sum(axis=2)) <= reach)
-        & (abs((way * other_geometric).sum(axis=2)) <= shifted(reach, dx, dy, 0.0))
-    )

@@ -87,6 +87,20 @@ def test_pattern_of_the_classes_is_gone_to_the_last_bit(device: Device, n: int, 
     np.testing.assert_allclose(run.image[0, 0], random_values((n, n), n).mean(axis=(0, 1)), rtol=1e-6)
 
 
+@settings(max_examples=20, deadline=None)
+@given(n=st.integers(2, 8), width=st.integers(16, 40), height=st.integers(16, 40), data=st.data())
+def test_what_is_linear_is_kept_up_to_the_border_and_the_pattern_taken_out(
+    device: Device, n: int, width: int, height: int, data: st.DataObject
+) -> None:
+    """At the border all neighbours lie on one side: their mean is not that of the pixel."""
+    right, down = (data.draw(st.floats(-0.05, 0.05)) for _ in range(2))
+    y, x = np.mgrid[:height, :width]
+    linear = 5.0 + (right * x + down * y)[..., None]
+    run = Run(device, wall(), linear + classes((width, height), n), n)
+    expected = linear + random_values((n, n), n).mean(axis=(0, 1))
+    np.testing.assert_allclose(run.image, expected, rtol=2e-6)
+
+
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
 def test_a_slanted_plane_is_even_at_every_depth(device: Device, kind: str) -> None:
     """Up to some 80 degrees, where neighbours lie far apart along the plane, but on it."""

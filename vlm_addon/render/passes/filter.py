@@ -5,8 +5,12 @@ For anything that n x n pixels found with a share of the samples each: irradianc
 the same modulo n in both directions are of one class. The result is the mean over the classes of what each has within
 n / 2 pixels: where the surface is even, each pixel once, and those at n / 2 for an even n half. So what depends on the
 class alone becomes the same everywhere, to the last bit. Other surfaces do not count, as the position and the normal
-tell. A class that then has nothing within n / 2 pixels, as at edges, is looked for within n: without it the other
-classes' lights would count for more.
+tell, for both pixels alike.
+
+At edges that leaves two errors. A class that has nothing within n / 2 pixels is looked for within n: without it the
+other classes' lights would count for more. And the pixels that count lie on one side, so their mean is that of a place
+inside; it is moved back along the slope. Pixels of one class used the same lights, so differences between them show the
+slope without the pattern.
 
 Values that are not numbers, infinite or beyond LARGEST are left out, so none spreads; their pixels get what their
 neighbours have, as any other pixel.
