@@ -2,7 +2,7 @@
 // What the walks of phase two do with the lights that they meet. They add up what these give, batch by batch: a plain
 // sum over 100,000 lights would lose digits. Or (PICKS) they pick some of them for each pixel, in proportion to what
 // they give there: those in which the running sum passes evenly spread shares of the sum, which an earlier walk found
-// (systematic sampling).
+// (systematic sampling). What is added up is seen as far as baked visibility says (BAKED).
 #ifndef PASSES_LIGHT_SUM
 #define PASSES_LIGHT_SUM
 #include "passes/tile_pixels.glsl"
@@ -75,6 +75,10 @@ void store_sums(uint tile) {
     }
 }
 #else
+#if BAKED
+#include "passes/baked_rows.glsl"
+#endif
+
 layout(rgba32f, binding = 0) uniform image2D irradiance; // W/m²
 
 vec3 sums[PIXELS];
@@ -84,6 +88,9 @@ void start_sums(uint tile) {
     for (int k = 0; k < PIXELS; ++k) {
         sums[k] = vec3(0.0);
     }
+#if BAKED
+    fetch_baked_rows(tile);
+#endif
 }
 
 void start_batch() {
@@ -93,6 +100,11 @@ void start_batch() {
 }
 
 void meet(int k, uint id, vec3 value) {
+#if BAKED
+    if (any(greaterThan(value, vec3(0.0)))) {
+        value *= baked_share(k, id & ~PICKED_CLUSTER);
+    }
+#endif
     batch_sums[k] += value;
 }
 

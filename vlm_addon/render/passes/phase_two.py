@@ -11,6 +11,7 @@ from ...core.scene import UNTAGGED
 from ..gpu_layout import CONSTANTS
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
+from .baked_pixels import PixelVisibility
 from .gbuffer import GBuffer
 from .light_picks import PICK_DEFINES, LightPicks
 from .tile_bounds import TILE_BINDING, TILE_DEFINES, TileBoundsPass, Tiles
@@ -25,7 +26,7 @@ MIN_LIGHTS_PER_DISPATCH = 64
 # Mesa's software renderers end all loops of an invocation after 65,535 iterations together, without a word; a light
 # takes one, and one more for each pixel of the invocation.
 MAX_LIGHTS_PER_DISPATCH = 8192
-PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, "UNTAGGED": UNTAGGED, "PICKS": False}
+PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, "UNTAGGED": UNTAGGED, "PICKS": False, "BAKED": False}
 
 
 class IrradianceImage:
@@ -45,15 +46,29 @@ class IrradianceImage:
 _DEFINES = {**PHASE_TWO_DEFINES, "LISTED": False}
 
 
+def seen_defines(visibility: PixelVisibility | None) -> dict[str, int | float | bool | str]:
+    """Of shaders that sum lights as far as `visibility` says."""
+    return {} if visibility is None else visibility.defines
+
+
 class PhaseTwoPass:
     """The sum over all lights of radiosity times form factor (seed 002, eq. 3.1 and 3.3)."""
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        width: int,
+        height: int,
+        visibility: PixelVisibility | None = None,
+    ) -> None:
+        """visibility: what the sum is multiplied by, light by light; None for 1."""
         self._context = context
+        self._visibility = visibility
         self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        self._shader = shaders.compute("passes/phase_two.comp", _DEFINES)
+        self._shader = shaders.compute("passes/phase_two.comp", {**_DEFINES, **seen_defines(visibility)})
 
     def render(
         self, gbuffer: GBuffer, lights: GpuVirtualLights, radiosity: moderngl.Buffer, progress: Progress
@@ -64,7 +79,11 @@ class PhaseTwoPass:
         out. `progress` hears of each dispatch and may cancel. The next call overwrites the texture.
         """
         self._irradiance.clear()
-        self._walk(self._shader, MAX_LIGHTS_PER_DISPATCH, gbuffer, lights, radiosity, progress)
+        most = MAX_LIGHTS_PER_DISPATCH
+        if self._visibility is not None:
+            self._visibility.bind(self._shader)
+            most = self._visibility.per_dispatch(most)
+        self._walk(self._shader, most, gbuffer, lights, radiosity, progress)
         return self._irradiance.texture
 
     def pick(

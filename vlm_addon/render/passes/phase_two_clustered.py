@@ -8,11 +8,19 @@ from typing import TYPE_CHECKING
 from ...core.progress import Progress, step
 from ..buffer_pool import BufferPool
 from ..light_forest import GpuLightForest
-from ..shader_library import ShaderLibrary, set_uniforms
+from ..shader_library import Defines, ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
+from .baked_pixels import PixelVisibility
 from .gbuffer import GBuffer
 from .light_picks import LightPicks
-from .phase_two import MAX_LIGHTS_PER_DISPATCH, PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
+from .phase_two import (
+    MAX_LIGHTS_PER_DISPATCH,
+    PHASE_TWO_DEFINES,
+    IrradianceImage,
+    bind_lights,
+    entry_runs,
+    seen_defines,
+)
 from .tile_bounds import TILE_SIDE, TileBoundsPass, Tiles
 from .tile_walk import (
     LIGHT_NODE_BINDING,
@@ -48,14 +56,23 @@ class ClusteredPhaseTwoPass:
     entries: in the lists of all tiles of the pictures so far. tiles: that showed a surface.
     """
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        width: int,
+        height: int,
+        visibility: PixelVisibility | None = None,
+    ) -> None:
+        """visibility: as of PhaseTwoPass, of clusters too."""
         self._context = context
+        self._visibility = visibility
         self._shaders = shaders
         self._pool = BufferPool(context)
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
         self._walk = TileWalkPass(context, shaders, self._pool)
-        self._sums = _of_both(shaders, {})
+        self._sums = _of_both(shaders, seen_defines(visibility))
         self.entries = 0
         self.tiles = 0
 
@@ -80,7 +97,11 @@ class ClusteredPhaseTwoPass:
         for share, lists in self._walk.lists(tiles, shown, forest):
             self.entries += lists.count
             self._irradiance.texture.bind_to_image(0)
-            self._meet(self._sums[lists.of_lights], _most(lists), tiles, lists, gbuffer, lights, radiosity, forest)
+            shader, most = self._sums[lists.of_lights], _most(lists)
+            if self._visibility is not None:
+                self._visibility.bind(shader, of_clusters=not lists.of_lights)
+                most = self._visibility.per_dispatch(most)
+            self._meet(shader, most, tiles, lists, gbuffer, lights, radiosity, forest)
             step(progress, share, "phase two")
         return self._irradiance.texture
 
@@ -135,7 +156,7 @@ class ClusteredPhaseTwoPass:
                 self._context.memory_barrier()
 
 
-def _of_both(shaders: ShaderLibrary, defines: dict[str, int | bool]) -> dict[bool, moderngl.ComputeShader]:
+def _of_both(shaders: ShaderLibrary, defines: Defines) -> dict[bool, moderngl.ComputeShader]:
     """Shaders for lists of clusters (False) and of lights (True)."""
     files = {False: "passes/phase_two_clusters.comp", True: "passes/phase_two.comp"}
     return {of_lights: shaders.compute(file, {**_DEFINES, **defines}) for of_lights, file in files.items()}

@@ -16,10 +16,11 @@ from ..gpu_layout import HALF_BALL
 from ..local_space import LocalSpace
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
+from .baked_pixels import PixelVisibility
 from .gbuffer import GBuffer
 from .light_grid import GpuBlockLists
 from .light_picks import LightPicks
-from .phase_two import PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs
+from .phase_two import PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs, seen_defines
 from .tile_bounds import TileBoundsPass
 from .tile_walk import LIST_BINDING, LIST_OFFSET_BINDING
 
@@ -65,12 +66,21 @@ class GpuRangeGrid:
 class RangePhaseTwoPass:
     """The sum over the lights of each pixel's cell; outside, over those whose active hemisphere holds it."""
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, width: int, height: int) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        shaders: ShaderLibrary,
+        width: int,
+        height: int,
+        visibility: PixelVisibility | None = None,
+    ) -> None:
+        """visibility: as of PhaseTwoPass."""
         self._context = context
+        self._visibility = visibility
         self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        self._shader = shaders.compute("passes/phase_two_range.comp", _DEFINES)
+        self._shader = shaders.compute("passes/phase_two_range.comp", {**_DEFINES, **seen_defines(visibility)})
 
     def render(
         self,
@@ -84,7 +94,11 @@ class RangePhaseTwoPass:
     ) -> moderngl.Texture:
         """As PhaseTwoPass.render. space: of the G-buffer and of `lights`. bounds: of the visible scene, world space."""
         self._irradiance.clear()
-        self._walk(self._shader, _MOST_PER_RUN, gbuffer, lights, radiosity, grids, space, bounds, progress)
+        most = _MOST_PER_RUN
+        if self._visibility is not None:
+            self._visibility.bind(self._shader)
+            most = self._visibility.per_dispatch(most)
+        self._walk(self._shader, most, gbuffer, lights, radiosity, grids, space, bounds, progress)
         return self._irradiance.texture
 
     def pick(

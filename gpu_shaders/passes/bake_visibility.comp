@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which share of a virtual light the surface of a row sees: ways between points of the row and samples of the light's
+// source surface that face each other, and how many of them nothing blocks. An invocation is one row and one light.
+#include "lib/octree_triangles.glsl"
+#include "lib/baked_visibility.glsl"
+
+layout(local_size_x = GROUP_SIZE) in;
+
+// In voxel coordinates; normals are unit and geometric. w is unused.
+struct Facet {
+    vec4 place;
+    vec4 normal;
+};
+
+layout(std430, binding = ROW_POINT_BINDING) readonly buffer RowPoints { Facet row_points[]; };
+layout(std430, binding = LIGHT_SAMPLE_BINDING) readonly buffer LightSamples { Facet light_samples[]; };
+layout(std430, binding = SAMPLE_OFFSET_BINDING) readonly buffer SampleOffsets { uint sample_offsets[]; };
+// A byte for each light, four in a word; 0 before.
+layout(std430, binding = SHARE_BINDING) buffer Shares { uint shares[]; };
+
+uniform uint points_per_row;
+uniform uint light_count;
+uniform uint words_per_row;
+// A run of pairs of a row and a light.
+uniform uint first_pair;
+uniform uint end_pair;
+
+void main() {
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint pair = first_pair + group * GROUP_SIZE + gl_LocalInvocationID.x;
+    if (pair >= end_pair) {
+        return;
+    }
+    uint row = pair / light_count, light = pair % light_count;
+    uint first = sample_offsets[light], count = sample_offsets[light + 1u] - first;
+    uint facing = 0u, seen = 0u;
+    for (uint i = 0u; i < points_per_row && count > 0u; ++i) {
+        Facet from = row_points[row * points_per_row + i], to = light_samples[first + baked_sample(row, i, count)];
+        vec3 way = to.place.xyz - from.place.xyz;
+        if (dot(way, from.normal.xyz) > 0.0 && dot(way, to.normal.xyz) < 0.0) {
+            ++facing;
+            bool sees = octree_points_see(from.place.xyz, from.normal.xyz, to.place.xyz, to.normal.xyz, EXACT_REACH);
+            seen += sees ? 1u : 0u;
+        }
+    }
+    // Where none face each other, nothing is known to stand between.
+    uint share = facing == 0u ? 255u : (510u * seen + facing) / (2u * facing);
+    atomicOr(shares[row * words_per_row + light / 4u], share << 8u * (light & 3u));
+}
