@@ -22,7 +22,6 @@ from .temporary import present, restored
 
 CONVERGED_BOUNCES = 32
 MINIMAL_SAMPLES = 2
-NARROWEST_FILTER = 0.01
 # Cycles' own bound of its seed.
 SEED_STEP = 7919
 
@@ -69,7 +68,7 @@ def render_reference(
     *,
     seed: int = 0,
     caustics: bool = True,
-    filter_width: float = 1.0,
+    at_centres: bool = False,
     scene: Any = None,
     view_layer: Any = None,
 ) -> Reference:
@@ -77,24 +76,21 @@ def render_reference(
 
     Specular light counts where it comes straight from a lamp. `samples` per pixel are shared by two renders of
     different seeds, whose difference gives the noise. caustics=False also leaves out lamps that are seen in a
-    specular lobe after a diffuse bounce; Cycles then gives that lobe's share back to the diffuse one. filter_width:
-    side of the square of each pixel that is averaged, pixels; NARROWEST_FILTER is what our pictures of one sample show.
-    Every setting is as before afterwards. Raises InvalidInput for sizes, bounces or samples out of range or a scene
-    without camera.
+    specular lobe after a diffuse bounce; Cycles then gives that lobe's share back to the diffuse one. at_centres:
+    the middles of pixels, as our pictures of one sample show, not means over pixels. Every setting is as before
+    afterwards. Raises InvalidInput for sizes, bounces or samples out of range or a scene without camera.
     """
     scene = scene or bpy.context.scene
     view_layer = view_layer or bpy.context.view_layer
     _require(width >= 1 and height >= 1, f"size {width}x{height}", "give at least one pixel each way")
     _require(samples >= MINIMAL_SAMPLES, f"samples {samples}", f"give at least {MINIMAL_SAMPLES}")
-    widths = f"give {NARROWEST_FILTER} to 10 pixels"
-    _require(NARROWEST_FILTER <= filter_width <= 10.0, f"filter width {filter_width}", widths)
     _require(diffuse_bounces >= 0, f"diffuse bounces {diffuse_bounces}", "give 0 or more")
     if scene.camera is None:
         raise InvalidInput(f"scene {scene.name!r}", "it has no camera", "add one (Add > Camera)")
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="vlm_reference_")))
         stack.enter_context(_reference_settings(scene, view_layer, width, height))
-        settings = {**_cycles_settings(diffuse_bounces, caustics), "filter_width": filter_width}
+        settings = _cycles_settings(diffuse_bounces, caustics) | (_CENTRES if at_centres else {})
         stack.enter_context(restored(scene.cycles, **settings))
         stack.enter_context(light_meshes_in_render(shown=False))
         shares = (samples - samples // 2, samples // 2)
@@ -152,6 +148,9 @@ def _reference_settings(scene: Any, view_layer: Any, width: int, height: int) ->
 
 # Restored from the last to the first: a file format is offered only with its media type.
 _IMAGE_SETTINGS = ("use_exr_interleave", "exr_codec", "color_depth", "color_mode", "file_format", "media_type")
+
+# Cycles' box is always a pixel wide.
+_CENTRES = {"pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
 
 
 def _cycles_settings(diffuse_bounces: int, caustics: bool) -> dict[str, Any]:
