@@ -11,6 +11,7 @@ from ..core.progress import Progress
 from ..core.range_grid import RangeSettings
 from .light_forest import GpuLightForest, make_forest
 from .passes.gbuffer import GBuffer
+from .passes.light_picks import LightPicks
 from .passes.phase_one import read_radiosity
 from .passes.phase_two import PhaseTwoPass
 from .passes.phase_two_clustered import ClusteredPhaseTwoPass
@@ -23,9 +24,11 @@ if TYPE_CHECKING:
 
 
 class LightSum(ABC):
-    """One way to sum the lights of a frame. kinds: of the structures that it needs."""
+    """One way to sum the lights of a frame. kinds: of the structures that it needs. forest: of the clusters that it
+    picks, if any."""
 
     kinds: tuple[str, ...] = ()
+    forest: GpuLightForest | None = None
 
     def __init__(self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer) -> None:
         """radiosity: of PhaseOnePass."""
@@ -36,6 +39,10 @@ class LightSum(ABC):
     @abstractmethod
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
         """Irradiance of each pixel in W/m², RGBA32F."""
+
+    @abstractmethod
+    def pick(self, picks: LightPicks, gbuffer: GBuffer, progress: Progress) -> None:
+        """Fills `picks` from what the last `render`, of the same G-buffer, added up."""
 
     @abstractmethod
     def counters(self) -> dict[str, float]:
@@ -59,6 +66,10 @@ class FullSum(LightSum):
         self._pictures += 1
         return self._pass.render(gbuffer, self.lights, self.radiosity, progress)
 
+    def pick(self, picks: LightPicks, gbuffer: GBuffer, progress: Progress) -> None:
+        """Of all lights."""
+        self._pass.pick(picks, gbuffer, self.lights, self.radiosity, progress)
+
     def counters(self) -> dict[str, float]:
         """For how many pairs of a light and a pixel of a sample they were summed."""
         pixels = self.scene.settings.width * self.scene.settings.height
@@ -79,11 +90,17 @@ class ClusteredSum(LightSum):
         with scene.timer.measure("relight"):
             values = read_radiosity(radiosity, lights.count)
             trees, self._window_factor = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
-            self._forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
+            self.forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
         """Irradiance of each pixel in W/m², RGBA32F."""
-        return self._pass.render(gbuffer, self.lights, self.radiosity, self._forest, progress)
+        assert self.forest is not None
+        return self._pass.render(gbuffer, self.lights, self.radiosity, self.forest, progress)
+
+    def pick(self, picks: LightPicks, gbuffer: GBuffer, progress: Progress) -> None:
+        """Of the lights and clusters that count at each pixel."""
+        assert self.forest is not None
+        self._pass.pick(picks, gbuffer, self.lights, self.radiosity, self.forest, progress)
 
     def counters(self) -> dict[str, float]:
         """evaluated_per_pixel: lights and clusters in the list of a pixel's tile, mean over tiles that show a surface;
@@ -118,6 +135,11 @@ class CellSum(LightSum):
         """Irradiance of each pixel in W/m², RGBA32F."""
         space, bounds = self.scene.space, self.scene.world.bounds()
         return self._pass.render(gbuffer, self.lights, self.radiosity, self._grids, space, bounds, progress)
+
+    def pick(self, picks: LightPicks, gbuffer: GBuffer, progress: Progress) -> None:
+        """Of the lights of each pixel's cell."""
+        space, bounds = self.scene.space, self.scene.world.bounds()
+        self._pass.pick(picks, gbuffer, self.lights, self.radiosity, self._grids, space, bounds, progress)
 
     def counters(self) -> dict[str, float]:
         """lists_entries: pairs of a light and a block of cells in the grids' lists. The others are of full cells."""

@@ -56,6 +56,10 @@ class LightPicks:
     def bind(self, shader: moderngl.ComputeShader, irradiance: moderngl.Texture) -> None:
         """As `begin`, for a shader that goes on."""
         irradiance.bind_to_image(0, write=False)
+        self.bind_read(shader)
+
+    def bind_read(self, shader: moderngl.ComputeShader) -> None:
+        """For a shader that goes through the picks."""
         self.met.bind_to_image(MET_IMAGE)
         self.buffer.bind_to_storage_buffer(PICK_BINDING)
         set_uniforms(shader, {"pick_count": self.count, "sample_index": self.sample_index})

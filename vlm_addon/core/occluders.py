@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Can anything in a scene stand between two points of its surfaces? Where it provably cannot, nobody need ask."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scene import Float64, Mesh
+
+MOST_PAIRS = 10_000_000
+"""Of a triangle and a point that are looked at, some tenths of a second; a scene with more counts as having occluders."""
+
+_AT_ONCE = 1_000_000
+_SLACK = 1e-6
+"""Of the scene's diagonal, some roundings of a place in float32: a point so near to a plane is in it."""
+
+
+@dataclass(frozen=True)
+class Occlusion:
+    """Whether something may stand between two surface points, and what decided that, as a sentence."""
+
+    possible: bool
+    reason: str
+
+
+def find_occlusion(meshes: Sequence[Mesh], source_points: Float64 | None = None) -> Occlusion:
+    """Whether something of `meshes` may stand between two points of them, or between one and `source_points` (s, 3).
+
+    Not so where every triangle has all points on one side of its plane, or in it: then all triangles are on the hull of
+    the scene, and a segment between two points of a convex body does not leave it. That is a room without anything
+    inside, a body alone, a plane. Raises nothing: what is not finite counts as an occluder.
+    """
+    filled = [mesh for mesh in meshes if len(mesh.triangles)]
+    triangle_count = sum(len(mesh.triangles) for mesh in filled)
+    if not triangle_count:
+        return Occlusion(False, "nothing can occlude anything: there is no surface")
+    points = np.concatenate([mesh.positions[np.unique(mesh.triangles)] for mesh in filled]).astype(np.float64)
+    if source_points is not None:
+        points = np.concatenate([points, source_points])
+    points = np.unique(points, axis=0)
+    slack = _SLACK * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    left, at_once = MOST_PAIRS, max(_AT_ONCE // len(points), 1)
+    for mesh in filled:
+        corners = mesh.positions[mesh.triangles].astype(np.float64)
+        for first in range(0, len(corners), at_once):
+            if left <= 0:
+                return Occlusion(True, f"{triangle_count:,} triangles may occlude each other: too many to compare all")
+            if not _have_all_on_one_side(corners[first : first + at_once], points, slack):
+                return Occlusion(True, f"{mesh.name!r} has other surfaces on both sides and may stand between them")
+            left -= at_once * len(points)
+    text = f"each of the {triangle_count:,} triangles has the whole scene on one side"
+    return Occlusion(False, f"nothing can occlude anything: {text}")
+
+
+def _have_all_on_one_side(corners: Float64, points: Float64, slack: float) -> bool:
+    """Whether each of (t, 3, 3) triangles has all of (p, 3) points on one side of its plane, within `slack` of it.
+
+    Triangles without area occlude nothing. False for what is not finite.
+    """
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    if not np.isfinite(lengths).all():
+        return False
+    solid = lengths > 0.0
+    normals, a = normals[solid] / lengths[solid, None], a[solid]
+    heights = normals @ points.T - np.einsum("ij,ij->i", normals, a)[:, None]
+    one_side = (heights >= -slack).all(axis=1) | (heights <= slack).all(axis=1)
+    return bool(one_side.all())
