@@ -3,21 +3,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
 
+from vlm_addon.core.light_walk import surface_means
 from vlm_addon.core.scene import Float64, SceneSnapshot
 from vlm_addon.core.vpl import VirtualPointLights
 from vlm_addon.render.device import Device
 from vlm_addon.render.kept import Kept
 from vlm_addon.render.local_space import LocalSpace
+from vlm_addon.render.passes.bounce_lights import BounceLightPass
 from vlm_addon.render.passes.flux_lights import FluxLightPass
 from vlm_addon.render.passes.rsm import LampReflections
+from vlm_addon.render.scene_octree import scene_octree
 
 WORLD = LocalSpace(np.zeros(3), 1.0)
-RESOLUTION, AREA_MAPS = 64, 4
+RESOLUTION, AREA_MAPS, OCTREE_RESOLUTION = 64, 4, 32
 
 
 def maps_of(device: Device, scene: SceneSnapshot, resolution: int = RESOLUTION) -> LampReflections:
@@ -40,6 +44,37 @@ def placed(
         lights = FluxLightPass(context, device.shaders)
         wanted = shifts if shifts is not None else [(0.0, 0.0)]
         return [lights.render(maps, space, count, first, shift).records().copy() for shift in wanted]
+
+
+def coloured(scene: SceneSnapshot) -> SceneSnapshot:
+    """With triangles that reflect as their materials do; small scenes from code leave that black."""
+    colours = np.array([material.base_color for material in scene.materials], np.float32)
+    meshes = [replace(mesh, reflectance=colours[mesh.material_indices]) for mesh in scene.meshes]
+    return replace(scene, meshes=tuple(meshes))
+
+
+def walked(
+    device: Device,
+    scene: SceneSnapshot,
+    counts: Sequence[int],
+    first: int = 1,
+    shifts: list[tuple[float, float]] | None = None,
+    space: LocalSpace = WORLD,
+) -> list[list[np.ndarray]]:
+    """Records of VIRTUAL_POINT_LIGHT of each bounce, for each shift; the first of `counts` is of the first bounce."""
+    coloured_scene = coloured(scene)
+    area = surface_means(coloured_scene.meshes).area
+    found = []
+    with device.current() as context:
+        maps, kept = maps_of(device, coloured_scene), Kept()
+        octree = scene_octree(context, device.shaders, kept, coloured_scene, OCTREE_RESOLUTION)
+        place, bounce = FluxLightPass(context, device.shaders), BounceLightPass(context, device.shaders)
+        for shift in shifts if shifts is not None else [(0.0, 0.0)]:
+            lights = [place.render(maps, space, counts[0], first, shift)]
+            for number, count in enumerate(counts[1:], 2):
+                lights.append(bounce.render(lights[-1], octree, space, count, number, first, shift, area))
+            found.append([part.records().copy() for part in lights])
+    return found
 
 
 @dataclass(frozen=True)
