@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Exact visibility and first hits: the walk of lib/octree.glsl, but an occupied voxel has its brick's triangles asked.
+// Exact visibility and first hits: the walk of lib/octree.glsl, but an occupied voxel has its triangles asked.
 //
-// Whoever includes this binds the octree's buffer to OCTREE_BINDING and the triangles of its bricks to
-// OCTREE_TRIANGLE_BINDING. A brick's triangles are asked for the whole way at once, so a brick is left as one cube and
-// never asked twice, and no rounding of where a hit lies decides whether it is found. What small lengths there are come
-// from core/brick_triangles.py, in steps of the lattice.
+// Whoever includes this binds the octree's buffer to OCTREE_BINDING and the triangles of its voxels to
+// OCTREE_TRIANGLE_BINDING. A voxel's triangles are asked for the whole way, so no rounding of where a hit lies decides
+// whether it is found. What small lengths there are come from core/brick_triangles.py, in steps of the lattice.
 //
 // Loops on software renderers (see lib/octree.glsl) also count each triangle that is asked. A way that is cut off counts
 // as blocked; a first hit that is cut off is the nearest one until then.
@@ -72,7 +71,7 @@ vec3 octree_triangle_vector(uint word) {
 
 // First word of a triangle.
 uint octree_triangle_word(uint tree, uint triangle) {
-    return octree_triangle_words[3u * tree + 2u] + 16u * triangle;
+    return octree_triangle_words[4u * tree + 3u] + 16u * triangle;
 }
 
 OctreeTriangle octree_triangle(uint word) {
@@ -119,15 +118,22 @@ float octree_lift() {
     return OCTREE_LIFT_SHARE * float(1u << octree_words[1]);
 }
 
-// First and last but one word of a brick's list.
-uvec2 octree_brick_list(uint tree, uint brick) {
-    uint start = octree_triangle_words[3u * tree] + brick;
-    return octree_triangle_words[3u * tree + 1u] + uvec2(octree_triangle_words[start], octree_triangle_words[start + 1u]);
+// Words from the first triangle of an occupied voxel's list to behind its last.
+uvec2 octree_list(uint tree, uint brick, ivec3 cell) {
+    uint word = octree_words[3u + 2u * tree] + 2u * brick;
+    uint bit = 8u * octree_octant(cell, 1u) + octree_octant(cell, 0u);
+    uint below = (1u << (bit % 32u)) - 1u;
+    uint before = uint(
+        bit < 32u ? bitCount(octree_words[word] & below)
+        : bitCount(octree_words[word]) + bitCount(octree_words[word + 1u] & below)
+    );
+    uint voxel = octree_triangle_words[octree_triangle_words[4u * tree] + brick] + before;
+    uint start = octree_triangle_words[4u * tree + 1u] + voxel;
+    return octree_triangle_words[4u * tree + 2u] + uvec2(octree_triangle_words[start], octree_triangle_words[start + 1u]);
 }
 
-// Whether a way meets a triangle of a brick.
-bool octree_brick_blocks(uint tree, uint brick, OctreeRay ray, float slack) {
-    uvec2 list = octree_brick_list(tree, brick);
+// Whether a way meets a triangle of a list.
+bool octree_list_blocks(uint tree, uvec2 list, OctreeRay ray, float slack) {
     for (uint i = list.x; i < list.y; ++i) {
         uint word = octree_triangle_word(tree, octree_triangle_words[i]);
         if (octree_crossing(ray, octree_triangle(word), slack) <= 1.0) {
@@ -144,12 +150,8 @@ bool octree_tree_open(uint tree, vec3 start, vec3 end) {
     float slack = octree_edge_slack();
     for (int i = octree_most_steps(); i > 0; --i) {
         VoxelBox box = octree_box(tree, walk.cell);
-        if (box.occupied) {
-            if (octree_brick_blocks(tree, box.brick, ray, slack)) {
-                return false;
-            }
-            box.low = walk.cell & -4;
-            box.high = box.low + 3;
+        if (box.occupied && octree_list_blocks(tree, octree_list(tree, box.brick, walk.cell), ray, slack)) {
+            return false;
         }
         if (!octree_leave(walk, box.low, box.high)) {
             return true;
@@ -196,22 +198,21 @@ bool octree_points_see(vec3 place, vec3 normal, vec3 other_place, vec3 other_nor
         && octree_open(leaving, high_leaving) && octree_open(high_arriving, arriving);
 }
 
-// The nearest of `found` and what a way meets in a brick; of two as near, the triangle of the smaller number.
-OctreeCrossing octree_brick_nearest(uint tree, uint brick, OctreeRay ray, float slack, OctreeCrossing found) {
-    uvec2 list = octree_brick_list(tree, brick);
+// The nearest of `found` and what a way meets in a list; of two as near, the triangle of the smaller number.
+OctreeCrossing octree_list_nearest(uint tree, uvec2 list, OctreeRay ray, float slack, OctreeCrossing found) {
     for (uint i = list.x; i < list.y; ++i) {
         uint triangle = octree_triangle_words[i];
         float fraction = octree_crossing(ray, octree_triangle(octree_triangle_word(tree, triangle)), slack);
         bool is_first = found.tree == tree && triangle < found.triangle;
-        if (fraction < found.fraction || (fraction == found.fraction && fraction <= 1.0 && is_first)) {
+        if (fraction <= 1.0 && (fraction < found.fraction || (fraction == found.fraction && is_first))) {
             found = OctreeCrossing(fraction, tree, triangle);
         }
     }
     return found;
 }
 
-// The nearest of `found` and what a way meets in one tree. A crossing may lie beyond the brick in which it was found;
-// the walk ends where it has come past it.
+// The nearest of `found` and what a way meets in one tree. A crossing may lie beyond the voxel in which it was found; the
+// walk ends where it has come past it.
 OctreeCrossing octree_tree_nearest(uint tree, vec3 start, vec3 end, OctreeCrossing found) {
     OctreeWalk walk = octree_walk(start, end);
     OctreeRay ray = octree_ray(start, end);
@@ -219,9 +220,7 @@ OctreeCrossing octree_tree_nearest(uint tree, vec3 start, vec3 end, OctreeCrossi
     for (int i = octree_most_steps(); i > 0 && walk.fraction <= found.fraction; --i) {
         VoxelBox box = octree_box(tree, walk.cell);
         if (box.occupied) {
-            found = octree_brick_nearest(tree, box.brick, ray, slack, found);
-            box.low = walk.cell & -4;
-            box.high = box.low + 3;
+            found = octree_list_nearest(tree, octree_list(tree, box.brick, walk.cell), ray, slack, found);
         }
         if (!octree_leave(walk, box.low, box.high)) {
             return found;

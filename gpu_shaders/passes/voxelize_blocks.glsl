@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Blocks of 2 x 2 x 2 cells of one level, each with a triangle that may meet them: what the next two passes share.
+// Blocks of 2 x 2 x 2 cells of one level, or bricks, each with a triangle that may meet them.
 #include "lib/triangle_box.glsl"
 
 layout(local_size_x = GROUP_SIZE) in;
@@ -8,12 +8,8 @@ layout(local_size_x = GROUP_SIZE) in;
 layout(std430, binding = TRIANGLE_BINDING) readonly buffer Triangles { vec4 triangles[]; };
 // The block's first cell in one word, and the triangle.
 layout(std430, binding = BLOCK_BINDING) readonly buffer Blocks { uvec2 blocks[]; };
-layout(std430, binding = MEETING_BINDING) buffer Meetings { uint meetings[]; };
-layout(std430, binding = TOTAL_BINDING) buffer Total { uint total; };
 
 uniform uint block_count;
-
-shared uint group_total;
 
 uint block_index() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
@@ -31,4 +27,15 @@ uint packed_cell(uvec3 cell) {
 VoxelTriangle triangle_at(uint index) {
     vec4 a = triangles[3u * index], b = triangles[3u * index + 1u], c = triangles[3u * index + 2u];
     return VoxelTriangle(a.xyz, b.xyz, c.xyz, vec3(a.w, b.w, c.w));
+}
+
+// Bits of the voxels of a brick that a triangle meets: 8 times the octant of 2 x 2 x 2 voxels plus its own in there.
+uvec2 voxels_that_meet(VoxelTriangle triangle, uvec3 brick, float growth) {
+    uvec2 mask = uvec2(0u);
+    for (uint left = cells_that_meet(triangle, 2u * brick, 2.0, growth); left != 0u; left &= left - 1u) {
+        uint i = uint(findLSB(left));
+        uvec3 first = 4u * brick + 2u * uvec3(i & 1u, i >> 1 & 1u, i >> 2);
+        mask[i / 4u] |= cells_that_meet(triangle, first, 1.0, growth) << (8u * (i % 4u));
+    }
+    return mask;
 }

@@ -16,14 +16,8 @@ void main() {
     }
     uvec2 block = blocks[index];
     uvec3 brick = unpacked_cell(block.x);
-    VoxelTriangle triangle = triangle_at(block.y);
-    uint mask[2] = uint[2](0u, 0u);
-    for (uint left = cells_that_meet(triangle, 2u * brick, 2.0, growth); left != 0u; left &= left - 1u) {
-        uint i = uint(findLSB(left));
-        uvec3 first = 4u * brick + 2u * uvec3(i & 1u, i >> 1 & 1u, i >> 2);
-        mask[i / 4u] |= cells_that_meet(triangle, first, 1.0, growth) << (8u * (i % 4u));
-    }
+    uvec2 mask = voxels_that_meet(triangle_at(block.y), brick, growth);
     uint place = first_brick + 2u * brick_number(brick);
-    atomicOr(octree[place], mask[0]);
-    atomicOr(octree[place + 1u], mask[1]);
+    atomicOr(octree[place], mask.x);
+    atomicOr(octree[place + 1u], mask.y);
 }

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The triangles of each brick. One invocation for a pair of a brick and a triangle: first it takes a place in the
-// brick's list, kept in `meetings`, then, when the counts have become the lists' beginnings (FILL), it writes the triangle there.
+// The triangles of each voxel. One invocation for a pair of a brick and a triangle: first it counts, then, when the counts
+// have become the lists' beginnings (FILL), it takes the next place in the list of each voxel that the triangle meets.
 #include "passes/voxelize_blocks.glsl"
 #include "passes/voxelize_rank.glsl"
 
+layout(std430, binding = OCTREE_BINDING) readonly buffer Octree { uint octree[]; };
+layout(std430, binding = VOXEL_BINDING) readonly buffer Voxels { uint voxels_before[]; };
 layout(std430, binding = COUNT_BINDING) buffer Counts { uint counts[]; };
 layout(std430, binding = LIST_BINDING) writeonly buffer Lists { uint lists[]; };
 
+uniform uint first_brick; // first word of the bricks in the octree
 uniform uint first_list; // first word of all lists
+uniform float growth;
 
 void main() {
     uint index = block_index();
@@ -15,10 +19,20 @@ void main() {
         return;
     }
     uvec2 block = blocks[index];
-    uint brick = brick_number(unpacked_cell(block.x));
+    uvec3 brick = unpacked_cell(block.x);
+    uint number = brick_number(brick);
+    uvec2 mask = voxels_that_meet(triangle_at(block.y), brick, growth);
+    uint voxel = voxels_before[number];
+    for (uint i = 0u; i < 2u; ++i) {
+        uint occupied = octree[first_brick + 2u * number + i];
+        for (uint left = mask[i] & occupied; left != 0u; left &= left - 1u) {
+            uint bit = uint(findLSB(left));
+            uint before = uint(bitCount(occupied & ((1u << bit) - 1u)));
+            uint place = atomicAdd(counts[voxel + before], 1u);
 #if FILL
-    lists[first_list + counts[brick] + meetings[index]] = block.y;
-#else
-    meetings[index] = atomicAdd(counts[brick], 1u);
+            lists[first_list + place] = block.y;
 #endif
+        }
+        voxel += uint(bitCount(occupied));
+    }
 }

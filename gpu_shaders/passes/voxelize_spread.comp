@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The blocks of the next level from the cells that triangles meet, in any order: what is made of them has no order.
 // `total` counts what has been written. LAST: the cells themselves, which are bricks.
-#include "passes/voxelize_blocks.glsl"
+#include "passes/voxelize_meetings.glsl"
 
 layout(std430, binding = NEXT_BINDING) writeonly buffer Next { uvec2 next[]; };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which cells of each block its triangle meets, and how many those are in all; MARK: also into the bits of the bricks.
-#include "passes/voxelize_blocks.glsl"
+#include "passes/voxelize_meetings.glsl"
 #include "lib/z_order.glsl"
 
 #if MARK

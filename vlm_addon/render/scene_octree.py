@@ -20,7 +20,7 @@ from ..core.voxel_frame import VoxelFrame, make_voxel_frame
 from .growing_buffer import GrowingBuffer
 from .kept import Kept
 from .local_space import LocalSpace
-from .passes.brick_lists import GpuBrickLists
+from .passes.voxel_lists import GpuVoxelLists
 from .passes.voxelize import GpuTree, VoxelizePass
 from .shader_library import ShaderLibrary
 
@@ -40,11 +40,11 @@ class SceneOctree:
     triangles: moderngl.Buffer
     frame: VoxelFrame
     trees: tuple[GpuTree, ...]
-    lists: tuple[GpuBrickLists, ...]
+    lists: tuple[GpuVoxelLists, ...]
     device_bytes: int
 
     def bind(self, octree_binding: int, triangle_binding: int) -> None:
-        """Binds the octree, and the triangles of its bricks."""
+        """Binds the octree, and the triangles of its voxels."""
         self.buffer.bind_to_storage_buffer(octree_binding)
         self.triangles.bind_to_storage_buffer(triangle_binding)
 
@@ -79,12 +79,12 @@ class _Builder:
         buffers = (*self.trees.values(), *self.lists.values())
         return self.voxelize.pool.nbytes + sum(buffer.nbytes for buffer in buffers)
 
-    def build(self, kind: str, places: Float64, reflectance: Float32, depth: int) -> tuple[GpuTree, GpuBrickLists]:
-        """The tree of a kind of objects and the triangles of its bricks."""
+    def build(self, kind: str, places: Float64, reflectance: Float32, depth: int) -> tuple[GpuTree, GpuVoxelLists]:
+        """The tree of a kind of objects and the triangles of its voxels."""
         return self.voxelize.build_with_lists(places, reflectance, depth, self.trees[kind], self.lists[kind])
 
-    def joined(self, built: Sequence[tuple[GpuTree, GpuBrickLists]]) -> tuple[moderngl.Buffer, moderngl.Buffer]:
-        """Buffers of all trees, and of the triangles of their bricks."""
+    def joined(self, built: Sequence[tuple[GpuTree, GpuVoxelLists]]) -> tuple[moderngl.Buffer, moderngl.Buffer]:
+        """Buffers of all trees, and of the triangles of their voxels."""
         trees = self.voxelize.join([tree for tree, _ in built], self.trees["joined"])
         return trees, self.voxelize.join_lists([lists for _, lists in built], self.lists["joined"])
 
@@ -115,7 +115,7 @@ def scene_octree(
             meshes: Sequence[Mesh] = meshes,
             triangles: Sequence[np.ndarray] = triangles,
             reflectance: Sequence[Float32] = reflectance,
-        ) -> tuple[GpuTree, GpuBrickLists]:
+        ) -> tuple[GpuTree, GpuVoxelLists]:
             colours = np.concatenate([np.zeros((0, 3), np.float32), *reflectance])
             return builder.build(kind, _places(meshes, triangles, frame), colours, frame.depth)
 

@@ -30,7 +30,7 @@ from ..buffer_pool import BufferPool
 from ..growing_buffer import GrowingBuffer, require_block
 from ..prefix_sum import INVOCATIONS, PrefixSum, run_for_each
 from ..shader_library import ShaderLibrary, set_uniforms
-from .brick_lists import BrickListPass, BrickPairs, GpuBrickLists
+from .voxel_lists import BrickPairs, GpuVoxelLists, VoxelListPass
 
 if TYPE_CHECKING:
     import moderngl
@@ -122,7 +122,7 @@ class VoxelizePass:
         self._spread = {last: shader("spread", LAST=last) for last in (False, True)}
         self._bricks, self._levels, self._count = shader("bricks"), shader("levels"), shader("count")
         self._nodes, self._clear = shader("nodes"), shader("clear")
-        self._lists = BrickListPass(context, shaders, self.pool, self._sum)
+        self._lists = VoxelListPass(context, shaders, self.pool, self._sum)
 
     def build(self, places: Float64, depth: int, target: GrowingBuffer) -> GpuTree:
         """The octree of (t, 3, 3) corners in voxel coordinates, in `target`'s buffer.
@@ -135,13 +135,13 @@ class VoxelizePass:
 
     def build_with_lists(
         self, places: Float64, reflectance: Float32, depth: int, target: GrowingBuffer, list_target: GrowingBuffer
-    ) -> tuple[GpuTree, GpuBrickLists]:
-        """As `build`, and the triangles of each brick in `list_target`'s buffer. reflectance: (t, 3)."""
+    ) -> tuple[GpuTree, GpuVoxelLists]:
+        """As `build`, and the triangles of each voxel in `list_target`'s buffer. reflectance: (t, 3)."""
         with ExitStack() as stack:
             tree, pairs = self._build(stack, places, depth, target)
             records = np.zeros((len(places), 4, 4), np.float32)
             records[:, :3], records[:, 3, :3] = triangle_records(places, depth), reflectance
-            return tree, self._lists.fill(pairs, tree.brick_count, records, list_target)
+            return tree, self._lists.fill(pairs, records, list_target)
 
     def _build(
         self, stack: ExitStack, places: Float64, depth: int, target: GrowingBuffer
@@ -157,17 +157,16 @@ class VoxelizePass:
         tree = self._allocated(ranks, layout, target)
         self._write_nodes(tree, bits, ranks, layout)
         _bind(TRIANGLE=triangles, BLOCK=pairs)
-        brick_word = layout.starts[layout.brick_level]
-        values = {
-            "block_count": pair_count,
-            "growth": growth_of(depth),
-            "brick_word": brick_word,
-            "first_brick": HEADER_WORDS + tree.node_count,
-        }
+        brick_word, first_brick = layout.starts[layout.brick_level], HEADER_WORDS + tree.node_count
+        growth = growth_of(depth)
+        values = {"block_count": pair_count, "growth": growth, "brick_word": brick_word, "first_brick": first_brick}
         self._run(self._bricks, pair_count, values)
-        return tree, BrickPairs(pairs, pair_count, bits, ranks, brick_word)
+        listed = BrickPairs(
+            triangles, pairs, pair_count, bits, ranks, brick_word, growth, tree.buffer, first_brick, tree.brick_count
+        )
+        return tree, listed
 
-    def join_lists(self, lists: Sequence[GpuBrickLists], target: GrowingBuffer) -> moderngl.Buffer:
+    def join_lists(self, lists: Sequence[GpuVoxelLists], target: GrowingBuffer) -> moderngl.Buffer:
         """A buffer with copies of the triangles of one or two trees, in the order of `join`."""
         return self._lists.join(lists, target)
 
