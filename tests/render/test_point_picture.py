@@ -33,3 +33,11 @@ def test_groups_have_colours_of_their_own() -> None:
     assert len(np.unique(colors.round(6), axis=0)) == 5
     np.testing.assert_array_equal(colors[0], colors[5])
     assert palette(np.zeros(0, int)).shape == (0, 3)
+
+
+def test_a_mark_colours_the_pixels_around_its_point_and_ends_with_the_picture() -> None:
+    points = np.array([[0.02, 0.02, 0.0], [-0.7, 0.34, 0.0]])
+    plus = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], bool)
+    drawn = with_points(np.zeros((18, 36, 3), np.float32), VIEW, points, np.ones((2, 3), np.float32), plus)
+    found = {(int(row), int(column)) for row, column in np.argwhere(drawn[..., 0] == 1.0)}
+    assert found == {(8, 18), (7, 18), (9, 18), (8, 17), (8, 19), (0, 0), (1, 0), (0, 1)}

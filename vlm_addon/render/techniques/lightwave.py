@@ -36,7 +36,7 @@ from ..passes.wave_light import (
     WaveLightPass,
     upload_wave,
 )
-from ..point_picture import palette, with_points
+from ..point_picture import DIMMED, palette, with_points
 from ..shader_library import set_uniforms
 from ..technique import FrameInputs, SceneInputs, Technique
 from ..view import View, make_view
@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 
 CORNERS, PIXELS = "corners", "pixels"
 VISIBILITY_UNIT = 10
-DIMMED = 0.3
-"""Of the base colour under the picture of the lights."""
 WITH_ACCURATE, WITH_INTEGRATED = ("shadows", ACCURATE), ("shadows", INTEGRATED)
 
 

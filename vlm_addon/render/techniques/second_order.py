@@ -23,6 +23,7 @@ from ..passes.gbuffer import GBuffer
 from ..passes.low_resolution import LowResolutionGather, LowResolutionSettings, PickedPixels, SizedPasses
 from ..passes.point_lights import GROUP_SIDE, LIGHT_BINDING, BoundPass, PointLightPass, PointLights, uploaded
 from ..passes.rsm import LampReflections
+from ..point_picture import DIMMED, SQUARE, with_points
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..technique import FrameInputs, SceneInputs, Technique
 from ..view import View
@@ -38,11 +39,7 @@ LOOKED_AT = 4
 """Pixels for each negative light: at most of them no light is stopped."""
 LEAST_FLUX = 1e-4
 """Of a negative light that counts, for a pixel and of the strongest one: rounding makes some on even walls."""
-MARK_RADIUS = 1
-"""Of a light's mark in its picture, pixels."""
 WHITE, BLUE = (1.0, 1.0, 1.0), (0.1, 0.3, 1.0)
-DIMMED = 0.3
-"""Of the base colour behind the marks."""
 
 
 @dataclass(frozen=True)
@@ -251,16 +248,7 @@ class SecondOrder(Technique):
         """Base colour with a mark for each light, over everything that may hide it."""
         image = DIMMED * read_image(frame.gbuffer.base_color)[..., :3]
         for records, colour in ((self._lights.records(), WHITE), (self._negative.records(), BLUE)):
-            for column, row in _pixels_of(records["position"], frame.view, image.shape[1], image.shape[0]):
-                rows, columns = (slice(max(at - MARK_RADIUS, 0), at + MARK_RADIUS + 1) for at in (row, column))
-                image[rows, columns] = colour
+            points = records["position"].astype(np.float64)
+            colours = np.tile(np.array(colour, np.float32), (len(points), 1))
+            image = with_points(image, frame.view, points, colours, SQUARE)
         return image
-
-
-def _pixels_of(positions: Float32, view: View, width: int, height: int) -> list[tuple[int, int]]:
-    """Columns and rows (from the top) of local `positions` that are in the picture."""
-    clip = np.append(positions.astype(float), np.ones((len(positions), 1)), axis=1) @ view.clip_from_local.T
-    clip = clip[clip[:, 3] > 0.0]
-    places = clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5
-    inside = ((places >= 0.0) & (places < 1.0)).all(axis=1)
-    return [(int(x * width), int(y * height)) for x, y in places[inside]]
