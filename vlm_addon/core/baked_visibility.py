@@ -36,6 +36,8 @@ FULL = 255
 MOST_ENTRIES = 12
 """Rows that count for a point. Where there are more, the largest weight left out is taken from all of them, so that
 nothing jumps where another row becomes the one that is left out."""
+MOST_POINTS = 32
+"""Of a row: an invocation of the bake casts a ray from each."""
 WEIGHT_STEPS = 4095
 """Weights of a point's rows are stored in so many steps."""
 POINT_STEP, ROW_STEP = 2654435769, 3242174889

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..core.cell_limit import Occupancy, overflow_text
 from ..core.progress import Progress
 from ..core.range_grid import RangeSettings
+from .baked_lights import BakedLights
 from .light_forest import GpuLightForest, make_forest
 from .passes.gbuffer import GBuffer
 from .passes.light_picks import LightPicks
@@ -30,8 +31,15 @@ class LightSum(ABC):
     kinds: tuple[str, ...] = ()
     forest: GpuLightForest | None = None
 
-    def __init__(self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer) -> None:
-        """radiosity: of PhaseOnePass."""
+    def __init__(
+        self,
+        scene: SceneInputs,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        baked: BakedLights | None = None,
+    ) -> None:
+        """radiosity: of PhaseOnePass. baked: visibility that each light is multiplied by; its rows are to be found
+        before each picture."""
         self.scene = scene
         self.lights = lights
         self.radiosity = radiosity
@@ -56,9 +64,17 @@ class LightSum(ABC):
 class FullSum(LightSum):
     """Every light for every pixel."""
 
-    def __init__(self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer) -> None:
-        super().__init__(scene, lights, radiosity)
-        self._pass = PhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+    def __init__(
+        self,
+        scene: SceneInputs,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        baked: BakedLights | None = None,
+    ) -> None:
+        super().__init__(scene, lights, radiosity, baked)
+        size = scene.settings.width, scene.settings.height
+        seen = None if baked is None else baked.of_lights()
+        self._pass = PhaseTwoPass(scene.context, scene.shaders, *size, seen)
         self._pictures = 0
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
@@ -82,15 +98,22 @@ class ClusteredSum(LightSum):
     kinds = ("static_tree", "dynamic_tree", "window_factor", "scale", "static_clusters", "dynamic_clusters")
 
     def __init__(
-        self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer, tolerance: float
+        self,
+        scene: SceneInputs,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        baked: BakedLights | None,
+        tolerance: float,
     ) -> None:
-        super().__init__(scene, lights, radiosity)
-        self._pass = ClusteredPhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        super().__init__(scene, lights, radiosity, baked)
         assert scene.world_lights is not None
         with scene.timer.measure("relight"):
             values = read_radiosity(radiosity, lights.count)
             trees, self._window_factor = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
             self.forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
+        size = scene.settings.width, scene.settings.height
+        seen = None if baked is None else baked.of_trees(trees)
+        self._pass = ClusteredPhaseTwoPass(scene.context, scene.shaders, *size, seen)
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
         """Irradiance of each pixel in W/m², RGBA32F."""
@@ -120,11 +143,18 @@ class CellSum(LightSum):
     kinds = ("static_grid", "dynamic_grid")
 
     def __init__(
-        self, scene: SceneInputs, lights: GpuVirtualLights, radiosity: moderngl.Buffer, settings: RangeSettings
+        self,
+        scene: SceneInputs,
+        lights: GpuVirtualLights,
+        radiosity: moderngl.Buffer,
+        baked: BakedLights | None,
+        settings: RangeSettings,
     ) -> None:
-        super().__init__(scene, lights, radiosity)
+        super().__init__(scene, lights, radiosity, baked)
         self._max_lights = settings.max_lights
-        self._pass = RangePhaseTwoPass(scene.context, scene.shaders, scene.settings.width, scene.settings.height)
+        size = scene.settings.width, scene.settings.height
+        seen = None if baked is None else baked.of_lights()
+        self._pass = RangePhaseTwoPass(scene.context, scene.shaders, *size, seen)
         assert scene.world_lights is not None
         with scene.timer.measure("light grid"):
             self._grids = scene.structures.range_grids(

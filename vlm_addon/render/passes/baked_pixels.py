@@ -47,8 +47,8 @@ _ROUNDS = MOST_ENTRIES + MOST_ENTRIES // 4
 class GpuBakedVisibility:
     """Baked visibility on the device. light_shares: rows of bytes, four in a word."""
 
-    def __init__(self, context: moderngl.Context, baked: BakedVisibility, rays: int = 0) -> None:
-        """rays: that were asked for to make it. Raises DeviceError where a block does not hold it."""
+    def __init__(self, context: moderngl.Context, baked: BakedVisibility, ways: int = 0) -> None:
+        """ways: between points that were looked at to make it. Raises DeviceError where a block does not hold it."""
 
         def upload(values: np.ndarray) -> moderngl.Buffer:
             require_room(context, values.nbytes)
@@ -56,7 +56,7 @@ class GpuBakedVisibility:
 
         self._context = context
         self.baked = baked
-        self.rays = rays
+        self.ways = ways
         cells = baked.cells
         self._buffers = [
             upload(np.stack([cells.first_zone[:-1], cells.label_start], axis=1)),
@@ -79,6 +79,11 @@ class GpuBakedVisibility:
         """Binds all but shares."""
         for binding, buffer in enumerate(self._buffers):
             buffer.bind_to_storage_buffer(binding)
+
+    def forget_counts(self) -> None:
+        """Sets `counts` to 0."""
+        self.counts.orphan()
+        self.counts.write(bytes(8))
 
     @property
     def counts(self) -> moderngl.Buffer:

@@ -7,10 +7,12 @@ import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...core.baked_visibility import CELL_COUNTS, MOST_POINTS
 from ...core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings
 from ...core.range_grid import RangeSettings
 from ...core.scene import Float32
 from ...core.settings import OWN, setting
+from ..baked_lights import BakedLights
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
 from ..light_visibility import OctreeVisibility, scene_occlusion
 from ..octree_settings import OctreeSettings
@@ -24,8 +26,8 @@ if TYPE_CHECKING:
     import moderngl
 
 ALL = "all"
-NONE, OCTREE = "none", "octree"
-WITH_OCTREE = ("visibility", OCTREE)
+NONE, OCTREE, BAKED = "none", "octree", "baked"
+WITH_OCTREE, WITH_BAKED = ("visibility", OCTREE), ("visibility", BAKED)
 SUM_SHARE = 0.4
 """Of a picture's progress, where rays are cast after the sum."""
 
@@ -58,10 +60,11 @@ class Settings:
         "",
         None,
         None,
-        "Whether surfaces stand in the way of indirect light: they do not, as in the thesis (none), or a few rays for "
-        "each pixel through an octree of the scene tell (octree), which about doubles the time and needs no bake",
+        "Whether surfaces stand in the way of indirect light: they do not, as in the thesis (none), a few rays for "
+        "each pixel through an octree of the scene tell (octree), which about doubles the time and needs no bake, or "
+        "what pieces of surface see of each light is found once for what stands still (baked)",
         source="002, 3.6; " + OWN,
-        choices=(NONE, OCTREE),
+        choices=(NONE, OCTREE, BAKED),
     )
     visibility_rays: int = setting(
         4,
@@ -78,6 +81,26 @@ class Settings:
     filter: str = _shared(FilterSettings, "filter", WITH_OCTREE)
     filter_distance: float = _shared(FilterSettings, "filter_distance", WITH_OCTREE)
     filter_cosine: float = _shared(FilterSettings, "filter_cosine", WITH_OCTREE)
+    visibility_cells: int = setting(
+        16,
+        "cells",
+        CELL_COUNTS[0],
+        CELL_COUNTS[-1],
+        "Along the longest side of the scene, a power of two: shadows are as sharp as cells are small; twice as many "
+        "take four times the memory and the time to bake",
+        source=OWN,
+        only_with=WITH_BAKED,
+    )
+    visibility_points: int = setting(
+        8,
+        "points",
+        1,
+        MOST_POINTS,
+        "Of each piece of surface, from which rays are cast to points of each light; more are smoother and take longer "
+        "to bake",
+        source=OWN,
+        only_with=WITH_BAKED,
+    )
 
 
 class VirtualLightMeshTechnique(Technique):
@@ -86,7 +109,9 @@ class VirtualLightMeshTechnique(Technique):
     Known bias: each light has one radiosity all over, light that leaves a surface by its specular layer does not
     bounce, and there is one bounce. Without visibility, indirect light is not occluded (seed 002, 3.6). With an octree,
     the rays of the 4 x 4 pixels around are shared, so that shadows are no sharper than that; a ray ends at a source
-    sample of its light; farther from its ends than the exact reach whole voxels stand in its way. With a tolerance,
+    sample of its light; farther from its ends than the exact reach whole voxels stand in its way. Baked visibility is
+    that of pieces of surface, so that shadows are no sharper than its cells, and next to the end of a wall light of
+    its other side reaches as far as a cell; surfaces of which nothing is baked see every light. With a tolerance,
     irradiance may be off by that share; with a range, the light of all lights that are farther away is missing.
     """
 
@@ -106,14 +131,26 @@ class VirtualLightMeshTechnique(Technique):
                 scene.light_mesh, scene.geometry.origin, scene.shadows, scene.settings.shadow_samples, scene.progress
             )
         before = dict(scene.kept.built)
+        self._baked, baked_reasons = self._chosen_bake()
         self._sum = self._chosen_sum()
-        kinds = self._sum.kinds
+        kinds = self._sum.kinds if self._baked is None else (*self._sum.kinds, *self._baked.kinds)
         self._built = {f"{kind}_built": scene.kept.built.get(kind, 0) - before.get(kind, 0) for kind in kinds}
-        self._visibility, self._occlusion = self._chosen_visibility()
+        self._visibility, octree_reasons = self._chosen_visibility()
+        self._occlusion = [*baked_reasons, *octree_reasons]
+
+    def _chosen_bake(self) -> tuple[BakedLights | None, list[str]]:
+        """What the sum is multiplied by, light by light, if anything need, and why not, if it was asked for."""
+        if self.chosen.visibility != BAKED:
+            return None, []
+        with self.scene.timer.measure("occluders"):
+            occlusion = scene_occlusion(self.scene)
+        if not occlusion.possible:
+            return None, [f"no visibility is baked: {occlusion.reason}"]
+        return BakedLights(self.scene, self.chosen), []
 
     def _chosen_sum(self) -> LightSum:
         """How the lights are summed."""
-        chosen, inputs = self.chosen, (self.scene, self._lights, self._radiosity)
+        chosen, inputs = self.chosen, (self.scene, self._lights, self._radiosity, self._baked)
         if chosen.lights == RANGE:
             return CellSum(*inputs, RangeSettings(chosen.grid, chosen.range, chosen.max_lights))
         if chosen.lights == TOLERANCE and self._lights.count > FEW_LIGHTS:
@@ -122,7 +159,7 @@ class VirtualLightMeshTechnique(Technique):
 
     def _chosen_visibility(self) -> tuple[OctreeVisibility | None, list[str]]:
         """What tells how much of the light gets there, if anything need, and why rays are cast or not, if asked for."""
-        if self.chosen.visibility == NONE:
+        if self.chosen.visibility != OCTREE:
             return None, []
         with self.scene.timer.measure("occluders"):
             occlusion = scene_occlusion(self.scene)
@@ -134,6 +171,8 @@ class VirtualLightMeshTechnique(Technique):
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the lights of radiosity times form factor, and times what gets there."""
         share = 1.0 if self._visibility is None else SUM_SHARE
+        if self._baked is not None:
+            self._baked.find(frame)
         with self.scene.timer.measure("phase two"):
             irradiance = self._sum.render(frame.gbuffer, lambda done, label: frame.progress(share * done, label))
         if self._visibility is None:
@@ -144,8 +183,9 @@ class VirtualLightMeshTechnique(Technique):
 
     def counters(self) -> dict[str, float]:
         """Virtual lights, which structures were built in this frame (0: kept), what their lists hold, and rays."""
-        rays = {} if self._visibility is None else self._visibility.counters()
-        return {"virtual_lights": self._lights.count, **self._built, **self._sum.counters(), **rays}
+        seen = [part.counters() for part in (self._visibility, self._baked) if part is not None]
+        found = {name: count for counters in seen for name, count in counters.items()}
+        return {"virtual_lights": self._lights.count, **self._built, **self._sum.counters(), **found}
 
     def images(self) -> dict[str, Float32]:
         """Of OctreeVisibility, where rays are cast."""
@@ -154,8 +194,9 @@ class VirtualLightMeshTechnique(Technique):
 
     def reasons(self) -> list[str]:
         """Why all lights are summed where a tolerance was asked for, why light is missing with a range, and why rays
-        are cast or not."""
+        are cast or visibility is baked, or not."""
+        seen = [*self._occlusion, *([] if self._baked is None else self._baked.reasons())]
         if self.chosen.lights != TOLERANCE or not isinstance(self._sum, FullSum):
-            return [*self._sum.reasons(), *self._occlusion]
+            return [*self._sum.reasons(), *seen]
         text = f"all {self._lights.count} virtual lights are summed: that costs no more than clusters of so few"
-        return [text, *self._occlusion]
+        return [text, *seen]
