@@ -11,7 +11,7 @@ from ..core.scene import Float32, Float64
 from .passes.accumulate import read_image
 from .passes.gbuffer import GBuffer
 from .passes.point_lights import PointLights
-from .point_picture import DIMMED, SQUARE, Bools, point_places, with_points
+from .point_picture import SQUARE, Bools, point_places, with_points
 from .view import View
 
 BOUNCE_MARKS: tuple[Bools, ...] = (
@@ -20,6 +20,8 @@ BOUNCE_MARKS: tuple[Bools, ...] = (
     np.array([[1, 0, 1], [0, 1, 0], [1, 0, 1]], bool),
 )
 """A square, an upright cross, a cross of diagonals."""
+DIMMED = 0.08
+"""Of the base colour behind the marks: white walls stay darker than marks of the mean power."""
 BRIGHTNESS_OF_MEAN = 0.5
 FAINTEST = 0.1
 """Of a mark whose light has next to no power."""
