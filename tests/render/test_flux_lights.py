@@ -8,8 +8,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
 
-from tests.render.closed_rooms import ROOM_REFLECTANCES, empty_room, room_area, wall_points
+from tests.render.closed_rooms import ROOM_REFLECTANCES, ROOM_SIZE, empty_room, room_area, wall_points
 from tests.render.flux_lights import RESOLUTION, WORLD, MapTexels, all_texels, as_lights, map_texels, placed
 from tests.render.rooms import box_room, quad
 from vlm_addon.core.flux_warp import choose_parts, importance_pyramid, warp_points
@@ -249,3 +252,29 @@ def test_parts_of_maps_leave_nothing_out_and_those_of_no_power_are_empty(weights
     assert (sizes >= 0.0).all()
     assert (sizes[np.array(weights) == 0.0] == 0.0).all()
     np.testing.assert_allclose(sizes, np.array(weights) / np.sum(weights), atol=1e-7)
+
+
+ROOM_LAMPS = st.builds(
+    lambda kind, power, place, angle: Light(
+        "l", kind, (power, 0.5 * power, 0.1 * power), place, spot_angle=angle, size_x=0.3, size_y=0.2
+    ),
+    st.sampled_from([POINT, SPOT, AREA]),
+    st.floats(1e-9, 1e9),
+    st.tuples(*(st.floats(-0.45 * side, 0.45 * side) for side in ROOM_SIZE)),
+    st.floats(0.02, 3.0),
+)
+
+
+@hypothesis_settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(st.lists(ROOM_LAMPS, min_size=1, max_size=3), st.integers(1, 3000), st.integers(1, 10**7))
+def test_any_lamps_of_any_power_give_all_their_light(
+    device: Device, lamps: list[Light], count: int, first: int
+) -> None:
+    scene = empty_room(lamps)
+    (records,) = placed(device, scene, count, first, [(0.0, 0.0)], resolution=16)
+    maps = map_texels(device, scene, resolution=16)
+    np.testing.assert_allclose(records["flux"].mean(axis=1), powers(maps).sum() / count, rtol=1e-4)
+    on_walls = np.abs(np.abs(records["position"]) - 0.5 * np.array(ROOM_SIZE)).min(axis=1)
+    assert on_walls.max() < 1e-3
+    assert (records["area"] > 0.0).all()
+    np.testing.assert_allclose(np.linalg.norm(records["normal"], axis=1), 1.0, atol=1e-4)
