@@ -105,7 +105,11 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     command.add_argument("--shadow-samples", type=int, default=32, metavar="N", help=shadow_help)
     world_help = "directions that stand for the world's light, each with a shadow map; the scene's own setting without"
     command.add_argument("--world-lights", type=int, metavar="N", help=world_help)
-    command.add_argument("--view", metavar="NAME", help="view transform of a PNG; the scene's without")
+    view_help = (
+        "view transform of a PNG; the scene's without; local: an exposure of its own and less contrast between bright "
+        "and dark parts, so that both show their textures"
+    )
+    command.add_argument("--view", metavar="NAME", help=view_help)
     command.add_argument("--out", type=Path, required=True, metavar="IMG", help=".exr (linear Rec.709) or .png")
     command.add_argument("--buffers", type=Path, metavar="DIR", help="every intermediate image as EXR into a folder")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="times, counts and findings")

@@ -322,3 +322,19 @@ def test_the_view_transform_changes_the_png_only(lit_room, tmp_path, capsys):
         assert run(capsys, "render", lit_room, *options)[0] == 0
         pictures.append(np.asarray(Image.open(path).convert("RGB"), float))
     assert pictures[0].mean() > pictures[1].mean() + 1.0
+
+
+def test_the_local_operator_makes_the_png_and_leaves_the_exr_linear(lit_room, tmp_path, capsys):
+    from PIL import Image
+
+    options = ["--technique", "direct", "--size", "32x24", "--samples", 1, "--buffers", tmp_path / "buffers"]
+    picture, linear, plain = (tmp_path / name for name in ("o.png", "local.exr", "plain.exr"))
+    assert run(capsys, "render", lit_room, *options, "--view", "local", "--out", picture)[0] == 0
+    display = read_image(tmp_path / "buffers" / "display.exr")
+    stored = np.asarray(Image.open(picture).convert("RGB"), float) / 255.0
+    encoded = np.where(display <= 0.0031308, 12.92 * display, 1.055 * display ** (1 / 2.4) - 0.055)
+    assert stored == pytest.approx(encoded[..., :3], abs=0.51 / 255)
+    assert stored.max() > 0.2
+    for view, path in (("local", linear), ("Standard", plain)):
+        assert run(capsys, "render", lit_room, *options[:-2], "--view", view, "--out", path)[0] == 0
+    assert np.array_equal(read_image(linear), read_image(plain))

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.image_io import read_image, view_transforms, write_image
+from vlm_addon.blender.image_io import LOCAL_VIEW, read_image, require_view, view_transforms, write_display, write_image
 from vlm_addon.core.errors import InvalidInput
 
 
@@ -122,3 +122,40 @@ def test_what_is_no_picture_is_refused(tmp_path, shape):
 def test_a_folder_that_is_not_there_is_named(tmp_path):
     with pytest.raises(InvalidInput, match="it cannot be written"):
         write_image(tmp_path / "missing" / "picture.exr", picture())
+
+
+def test_a_display_picture_is_stored_whatever_the_views_settings(tmp_path, scene, file_state):
+    scene.view_settings.exposure, scene.view_settings.gamma = 3.0, 2.0
+    scene.render.image_settings.file_format = "JPEG"
+    scene.render.image_settings.color_mode = "BW"
+    before = file_state()
+    image = picture(4)
+    image[..., 3] = 1.0
+    write_display(tmp_path / "picture.png", image)
+    assert file_state() == before
+    assert loaded(tmp_path / "picture.png")[..., :3] == pytest.approx(srgb(image[..., :3]), abs=0.51 / 255)
+
+
+def test_a_display_pictures_alpha_becomes_straight(tmp_path, scene):
+    image = np.zeros((2, 3, 4), np.float32)
+    image[:, :2] = 0.25
+    image[:, :2, 3] = 0.5
+    write_display(tmp_path / "picture.png", image)
+    found = loaded(tmp_path / "picture.png")
+    assert found[:, :2, :3] == pytest.approx(np.full((2, 2, 3), srgb(0.5)), abs=0.51 / 255)
+    assert found[:, :2, 3] == pytest.approx(np.full((2, 2), 0.5), abs=0.51 / 255)
+    assert not found[:, 2].any()
+
+
+def test_a_display_picture_that_cannot_be_written_is_named(tmp_path, scene, file_state):
+    before = file_state()
+    with pytest.raises(InvalidInput, match="it cannot be written"):
+        write_display(tmp_path / "missing" / "picture.png", picture(4))
+    assert file_state() == before
+
+
+def test_the_local_operator_is_a_view_by_name(scene):
+    require_view(LOCAL_VIEW)
+    require_view("Standard")
+    with pytest.raises(InvalidInput, match=r"view transform 'Local': .*Standard, .*AgX.*, or local"):
+        require_view("Local")

@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.render.rooms import box_room
 from tests.render.shader_functions import evaluate
 from vlm_addon.core.scene import Float32, Float64
 from vlm_addon.render.device import Device
+from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.render.passes.accumulate import read_image
 from vlm_addon.render.passes.tonemap import (
     EDGE_VARIANCE,
@@ -210,6 +214,13 @@ def test_the_next_picture_holds_nothing_of_the_one_before(device: Device) -> Non
             found.append(read_image(tone_map.render(context.texture((40, 30), 4, values.tobytes(), dtype="f4"))))
     assert (found[0] == found[2]).all()
     assert not (found[0] == found[1]).all()
+
+
+def test_a_frame_has_its_display_picture_on_demand(device: Device) -> None:
+    settings = RenderSettings(40, 30, "direct", samples=1, display=True)
+    images = device.render(box_room(), None, settings).images
+    assert (images["display"] == shown(device, images["combined"])).all()
+    assert "display" not in device.render(box_room(), None, replace(settings, display=False)).images
 
 
 def test_luminance_is_that_of_rec709(device: Device) -> None:

@@ -29,7 +29,7 @@ from ..terminal import TerminalProgress, table
 from .authoring import NAME
 from .availability import light_mesh_objects
 from .extract import ExtractOptions, require_camera, require_lights, require_surfaces
-from .image_io import require_format, require_view, write_image
+from .image_io import LOCAL_VIEW, PNG, require_format, require_view, write_display, write_image
 from .light_grid_options import keep_options, scene_grid_settings
 from .light_mesh_io import Extraction, extract, extract_light_mesh
 from .names import SOURCES_PROPERTY
@@ -130,7 +130,7 @@ def render_command(arguments: Namespace) -> None:
     settings = _setting_texts(arguments.set)
     technique = technique_by_name(arguments.technique)
     from_mapping(technique.settings, settings, f"technique {technique.name!r}")
-    require_format(arguments.out)
+    is_local = require_format(arguments.out) == PNG and arguments.view == LOCAL_VIEW
     _require_apart(arguments.scene, [path for path in (arguments.out, arguments.json) if path is not None])
     width, height = arguments.size or (1, 1)
     frame_settings = RenderSettings(
@@ -142,6 +142,7 @@ def render_command(arguments: Namespace) -> None:
         shadow_samples=arguments.shadow_samples,
         world_lights=RenderSettings.world_lights if arguments.world_lights is None else arguments.world_lights,
         buffers=arguments.buffers is not None,
+        display=is_local,
     )
     require_in_range(frame_settings)
     if arguments.buffers is not None:
@@ -164,7 +165,10 @@ def render_command(arguments: Namespace) -> None:
     if arguments.buffers is not None:
         for name, image in frame.images.items():
             write_image(arguments.buffers / f"{name}.exr", image)
-    write_image(arguments.out, frame.images["combined"], view=arguments.view)
+    if is_local:
+        write_display(arguments.out, frame.images["display"])
+    else:
+        write_image(arguments.out, frame.images["combined"], view=arguments.view)
     _print_findings((*frame.findings, *found.snapshot.findings))
     for reason in frame.reasons:
         print(f"pass: {reason}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures to files: EXR in linear Rec.709, PNG as the scene's view transform shows them."""
+"""Pictures to files: EXR in linear Rec.709, PNG as the scene's view transform or our local operator shows them."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from .color_space import convert, rec709_to_working
 from .temporary import present, restored
 
 EXR, PNG = ".exr", ".png"
+LOCAL_VIEW = "local"
+"""In place of a view transform's name: the renderer's own tone mapping (`render/passes/tonemap.py`)."""
 
 
 def write_image(path: Path | str, image: Float32, *, view: str | None = None, scene: Any = None) -> None:
@@ -40,6 +42,29 @@ def write_image(path: Path | str, image: Float32, *, view: str | None = None, sc
             _write_png(temporary, image, view, scene or bpy.context.scene)
 
 
+def write_display(path: Path | str, image: Float32) -> None:
+    """Writes a PNG of what a display shows, whatever the scene's view settings say. It appears whole or not at all.
+
+    image: (h, w, 4) float32, display-linear Rec.709 in [0, 1], row 0 at the top, alpha premultiplied. Raises
+    InvalidInput for a path that cannot be written.
+    """
+    path = Path(path)
+    alpha = image[..., 3:]
+    straight = np.clip(image[..., :3] / np.where(alpha > 0.0, alpha, 1.0), 0.0, 1.0)
+    encoded = np.where(straight <= 0.0031308, 12.92 * straight, 1.055 * straight ** (1.0 / 2.4) - 0.055)
+    height, width = image.shape[:2]
+    # A picture of bytes is stored as it is.
+    datablock = bpy.data.images.new("vlm temporary", width, height, alpha=True)
+    try:
+        rgba = np.concatenate([encoded, alpha], axis=2)[::-1]
+        datablock.pixels.foreach_set(np.ascontiguousarray(rgba, np.float32).ravel())
+        datablock.file_format = "PNG"
+        with atomic_output(path) as temporary, _one_sentence(path):
+            datablock.save(filepath=str(temporary))
+    finally:
+        bpy.data.images.remove(datablock)
+
+
 def require_format(path: Path | str) -> str:
     """The suffix of a picture's path in lower case. Raises InvalidInput unless it is one that can be written."""
     suffix = Path(path).suffix.lower()
@@ -57,9 +82,14 @@ def read_image(path: Path | str) -> Float32:
 
 
 def require_view(view: str, scene: Any = None) -> None:
-    """Raises InvalidInput unless the scene's display has a view transform of that name."""
-    with _view(scene or bpy.context.scene, view):
-        pass
+    """Raises InvalidInput unless the scene's display has a view transform of that name, or it is LOCAL_VIEW."""
+    if view == LOCAL_VIEW:
+        return
+    try:
+        with _view(scene or bpy.context.scene, view):
+            pass
+    except InvalidInput as error:
+        raise InvalidInput(error.subject, error.problem, f"{error.remedy}, or {LOCAL_VIEW}") from None
 
 
 def view_transforms(scene: Any = None) -> list[str]:
@@ -79,10 +109,17 @@ def _write_png(path: Path, image: Float32, view: str | None, scene: Any) -> None
             stack.enter_context(_view(scene, view))
         stack.enter_context(_png_settings(scene, image.shape[2]))
         datablock = stack.enter_context(_image_datablock(image))
-        try:
-            datablock.save_render(str(path), scene=scene)
-        except RuntimeError as error:
-            raise VlmError(f"{path}: Blender could not write it ({' '.join(str(error).split())})") from error
+        stack.enter_context(_one_sentence(path))
+        datablock.save_render(str(path), scene=scene)
+
+
+@contextmanager
+def _one_sentence(path: Path) -> Iterator[None]:
+    """What Blender says where it cannot write, as our error."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise VlmError(f"{path}: Blender could not write it ({' '.join(str(error).split())})") from error
 
 
 @contextmanager

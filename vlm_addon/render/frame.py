@@ -22,6 +22,7 @@ from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
 from .passes.shadow_map import LampShadows
+from .passes.tonemap import ToneMapPass
 from .picture_shares import direct_world_lights, picture_shares
 from .technique import FrameInputs, SceneInputs, technique_by_name
 from .view import make_view, require_usable
@@ -112,6 +113,9 @@ def render_frame(
         images |= technique.images()
     else:
         del images["irradiance"]
+    if settings.display:
+        with timer.measure("tone mapping"):
+            images["display"] = _display_image(device, images["combined"])
     counters = {
         "triangles": geometry.triangle_count,
         "lights": lamps,
@@ -177,6 +181,13 @@ def _finished_images(sums: dict[str, Float32]) -> tuple[dict[str, Float32], list
         clean = np.where(broken[..., None], 0.0, np.maximum(values, 0.0))
         images[name] = np.ascontiguousarray(clean, np.float32)
     return images, findings
+
+
+def _display_image(device: Device, image: Float32) -> Float32:
+    """RGBA, display-linear, of a picture of linear RGBA."""
+    height, width = image.shape[:2]
+    picture = device.context.texture((width, height), 4, np.ascontiguousarray(image[::-1]).tobytes(), dtype="f4")
+    return read_image(ToneMapPass(device.context, device.shaders, width, height).render(picture))
 
 
 def _surface_images(

@@ -19,7 +19,8 @@ class RenderSettings:
     pictures averaged per pixel (box filter of one pixel). shadow_samples: points of a
     soft lamp, in phase one and at least in the finished picture. buffers: also return every intermediate image.
     world_lights: directions that stand for what the world sends, each with a shadow map; none where it is black.
-    Direct light, whose shadows are seen, has up to four times as many with more samples.
+    Direct light, whose shadows are seen, has up to four times as many with more samples. display: also return the
+    picture as the local tone mapping operator shows it.
     """
 
     width: int
@@ -31,6 +32,7 @@ class RenderSettings:
     shadow_samples: int = 32
     buffers: bool = False
     world_lights: int = 64
+    display: bool = False
 
 
 LIMITS = {
@@ -57,9 +59,9 @@ class Frame:
     """A finished picture.
 
     images: float32 (h, w, c) linear Rec.709, row 0 at the top; always `combined` (RGBA, premultiplied), `direct` and
-    `indirect` (RGB radiance, W/(m² sr)). timings: (pass name, milliseconds) in order. counters: what was counted
-    (lights, triangles, samples …). device: name of the device; timer: how milliseconds were taken. reasons: why a pass
-    ran in another way than was asked for.
+    `indirect` (RGB radiance, W/(m² sr)); on demand `display` (RGBA, display-linear in [0, 1]). timings: (pass name,
+    milliseconds) in order. counters: what was counted (lights, triangles, samples …). device: name of the device;
+    timer: how milliseconds were taken. reasons: why a pass ran in another way than was asked for.
     """
 
     images: dict[str, Float32]
