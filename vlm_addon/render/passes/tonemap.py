@@ -29,7 +29,7 @@ KEY = 0.18
 """Of the display's luminance, before the curve, that the picture's mean becomes (Reinhard et al. 2002: middle grey)."""
 WHITE = 2.0
 """Luminance before the curve that becomes 1."""
-MOST_SPREAD = 1.0
+MOST_SPREAD = 1.25
 """Stops, standard deviation of the base; larger ones are brought down to it."""
 EDGE_VARIANCE = 0.25
 """Stops², of what is half an edge and half detail. Halos beside an edge are below 0.12 stops; with 0.5 below 0.2."""
