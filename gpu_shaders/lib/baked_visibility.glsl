@@ -45,6 +45,13 @@ float byte_of_word(uint word, uint light) {
     return float(word >> 8u * (light & 3u) & 255u);
 }
 
+// Whether points of two surfaces are over each other's planes. way: from the first to the second, in voxels, which float32
+// knows to some 1e-5; normals are unit.
+bool surfaces_face(vec3 way, vec3 normal, vec3 other_normal) {
+    float least = BAKED_GRAZING * max(length(way), 1.0);
+    return dot(way, normal) > least && dot(way, other_normal) < -least;
+}
+
 // Which of a light's samples a row's point looks at: all of them are looked at by some row, and points that follow each
 // other look at samples far apart.
 uint baked_sample(uint row, uint point, uint count) {

@@ -37,13 +37,12 @@ void main() {
     for (uint i = 0u; i < points_per_row && count > 0u; ++i) {
         Facet from = row_points[row * points_per_row + i], to = light_samples[first + baked_sample(row, i, count)];
         vec3 way = to.place.xyz - from.place.xyz;
-        if (dot(way, from.normal.xyz) > 0.0 && dot(way, to.normal.xyz) < 0.0) {
+        if (surfaces_face(way, from.normal.xyz, to.normal.xyz)) {
             ++facing;
             bool sees = octree_points_see(from.place.xyz, from.normal.xyz, to.place.xyz, to.normal.xyz, EXACT_REACH);
             seen += sees ? 1u : 0u;
         }
     }
-    // Where none face each other, nothing is known to stand between.
-    uint share = facing == 0u ? 255u : (510u * seen + facing) / (2u * facing);
+    uint share = facing == 0u ? BAKED_UNFACED : (2u * BAKED_FULL * seen + facing) / (2u * facing);
     atomicOr(shares[row * words_per_row + light / 4u], share << 8u * (light & 3u));
 }

@@ -15,10 +15,8 @@ uniform uint words_per_row;
 
 #define BAKED_GROUPS 3
 
-// Four rows and weights each.
+// Four rows and weights each, largest weights first.
 uvec4 baked_rows[PIXELS * BAKED_GROUPS];
-// Sum of the weights times the byte of a light that is seen whole; 0 for a pixel without rows, which sees all.
-float baked_totals[PIXELS];
 
 void fetch_baked_rows(uint tile) {
     for (int k = 0; k < PIXELS; ++k) {
@@ -26,36 +24,27 @@ void fetch_baked_rows(uint tile) {
         baked_rows[BAKED_GROUPS * k] = texelFetch(first_baked_rows, pixel, 0);
         baked_rows[BAKED_GROUPS * k + 1] = texelFetch(second_baked_rows, pixel, 0);
         baked_rows[BAKED_GROUPS * k + 2] = texelFetch(third_baked_rows, pixel, 0);
-        baked_totals[k] = 0.0;
-        for (int group = 0; group < BAKED_GROUPS; ++group) {
-            uvec4 words = baked_rows[BAKED_GROUPS * k + group];
-            for (int i = 0; i < 4; ++i) {
-                baked_totals[k] += 255.0 * weight_of_packed(words[i]);
-            }
-        }
-        if (!shown[k]) {
-            baked_totals[k] = 0.0;
-        }
     }
 }
 
-// Exactly 1 where all rows see all of the light: sums of whole numbers below 2^24.
+// The share of a light or cluster that pixel k sees: the mean of its rows that say something of it. Exactly 1 where all
+// of these see it whole: sums of whole numbers below 2^24. 1 for a pixel without rows.
 float baked_share(int k, uint light) {
-    if (baked_totals[k] == 0.0) {
-        return 1.0;
-    }
-    float sum = 0.0;
+    float total = 0.0, sum = 0.0;
     for (int group = 0; group < BAKED_GROUPS; ++group) {
         uvec4 words = baked_rows[BAKED_GROUPS * k + group];
-        // Largest weights come first.
         if (words.x == 0u) {
             break;
         }
         for (int i = 0; i < 4; ++i) {
             uint word = baked_shares[row_of_packed(words[i]) * words_per_row + light / 4u];
-            sum += weight_of_packed(words[i]) * byte_of_word(word, light);
+            float weight = weight_of_packed(words[i]), share = byte_of_word(word, light);
+            weight = share == float(BAKED_UNFACED) ? 0.0 : weight;
+            total += weight;
+            sum += weight * share;
         }
     }
-    return sum / baked_totals[k];
+    bool has_rows = baked_rows[BAKED_GROUPS * k].x != 0u;
+    return total > 0.0 ? sum / (float(BAKED_FULL) * total) : (has_rows ? 0.0 : 1.0);
 }
 #endif

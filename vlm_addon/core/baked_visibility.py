@@ -31,8 +31,13 @@ from .voxel_frame import RESOLUTIONS, VoxelFrame, make_voxel_frame
 UInt8 = npt.NDArray[np.uint8]
 UInt32 = npt.NDArray[np.uint32]
 
-FULL = 255
+FULL = 254
 """Byte of a light that is seen whole."""
+UNFACED = 255
+"""Byte of a light of which no sample faces a point of the row: it says nothing. Where all rows of a point say so, the
+point sees nothing of the light, which may stand a little behind the surface that it stands for."""
+GRAZING = 2.0**-10
+"""Cosine below which points are in each other's planes, but for rounding."""
 MOST_ENTRIES = 12
 """Rows that count for a point. Where there are more, the largest weight left out is taken from all of them, so that
 nothing jumps where another row becomes the one that is left out."""
@@ -50,6 +55,8 @@ CELL_COUNTS = tuple(resolution // SIDE for resolution in RESOLUTIONS if 4 * SIDE
 LEAST_WEIGHT = 1e-6
 """Sum of weights below which a point has no row."""
 
+# Shares of lights that are summed up at once: some 100 MB.
+_AT_ONCE = 1 << 22
 _CORNER_SHIFT, _ROW_SHIFT = 3, 6
 
 
@@ -86,15 +93,18 @@ class BakedVisibility:
         return self.frame.resolution // SIDE
 
     def at(self, positions: npt.ArrayLike, normals: npt.ArrayLike) -> Float64:
-        """(p, lights) visibility in [0, 1] at points of the surface, world space; 1 where no row is near.
+        """(p, lights) visibility in [0, 1] at points of the surface, world space; 1 where no row is near, 0 of lights
+        that face none of the rows.
 
         positions: (p, 3), m, in zones that are known or not. normals: (p, 3) unit, geometric, on the side that is lit.
         """
         places = self.frame.voxels(as_numbers(positions, "surface points", "give (p, 3) numbers, m"))
         weights = row_weights(self, places, np.asarray(normals, np.float64))
-        total = weights.sum(axis=1)
-        sums = weights @ (self.shares.astype(np.float64) / FULL)
-        return np.where(total[:, None] > 0.0, sums / np.maximum(total, LEAST_WEIGHT)[:, None], 1.0)
+        known = (self.shares != UNFACED).astype(np.float64)
+        total = weights @ known
+        sums = weights @ (known * self.shares / FULL)
+        seen = sums / np.where(total > 0.0, total, 1.0)
+        return np.where(weights.any(axis=1)[:, None], seen, 1.0)
 
 
 def row_weights(baked: BakedVisibility, places: Float64, normals: Float64) -> Float64:
@@ -187,17 +197,20 @@ def visibility_frame(snapshot: SceneSnapshot, cells: int) -> VoxelFrame:
 
 
 def cluster_shares(tree: LightTree, shares: UInt8, areas: Float64) -> UInt8:
-    """(rows, clusters): what each row sees of the clusters of a tree, the mean over their lights by area.
+    """(rows, clusters): what each row sees of the clusters of a tree, the mean over lights that face it by area.
 
     areas: (n,) m², of all lights.
     """
-    weights = areas[tree.light_order]
-    totals = np.maximum(tree.sums(weights[None])[0], np.finfo(float).tiny)
+    # A light without area counts as a little.
+    weights = np.maximum(areas[tree.light_order], np.finfo(float).tiny)
     result = np.zeros((len(shares), len(tree)), np.uint8)
-    at_once = max(1, (1 << 24) // max(len(weights), 1))
+    at_once = max(1, _AT_ONCE // max(len(weights), 1))
     for start in range(0, len(shares), at_once):
-        part = slice(start, start + at_once)
-        result[part] = np.rint(tree.sums(shares[part][:, tree.light_order] * weights) / totals)
+        members = shares[start : start + at_once][:, tree.light_order]
+        known = weights * (members != UNFACED)
+        totals, sums = tree.sums(known), tree.sums(known * members)
+        mean = np.rint(sums / np.where(totals > 0.0, totals, 1.0))
+        result[start : start + at_once] = np.where(totals > 0.0, mean, UNFACED)
     return result
 
 

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.baked_visibility import POINT_STEP, ROW_STEP, WEIGHT_STEPS, UInt8, words_of
+from ...core.baked_visibility import (
+    FULL,
+    GRAZING,
+    POINT_STEP,
+    ROW_STEP,
+    UNFACED,
+    WEIGHT_STEPS,
+    UInt8,
+    words_of,
+)
 from ...core.brick_triangles import ALL_EXACT
 from ...core.errors import DeviceError
 from ...core.light_mesh import SourceSamples
@@ -26,6 +35,9 @@ if TYPE_CHECKING:
 RAYS_PER_DISPATCH = 1 << 20
 BAKED_DEFINES: dict[str, int | float | bool | str] = {
     "BAKED_WEIGHT_STEPS": f"{WEIGHT_STEPS}u",
+    "BAKED_FULL": f"{FULL}u",
+    "BAKED_UNFACED": f"{UNFACED}u",
+    "BAKED_GRAZING": GRAZING,
     "BAKED_POINT_STEP": f"{POINT_STEP}u",
     "BAKED_ROW_STEP": f"{ROW_STEP}u",
 }
