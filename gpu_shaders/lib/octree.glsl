@@ -23,13 +23,15 @@ struct VoxelBox {
     uint brick;
 };
 
-// A way through voxels. cell: where it is; last: where it ends; fraction: of the way, about where it came into `cell`.
+// A way through voxels. cell: where it is; last: where it ends; fraction: of the way, about where it came into `cell`;
+// steps: how many it may take yet.
 struct OctreeWalk {
     vec3 start;
     vec3 along;
     ivec3 cell;
     ivec3 last;
     float fraction;
+    int steps;
 };
 
 // Voxel coordinates of a position. frame: the octree's lower corner, and voxels for each unit of length.
@@ -83,13 +85,9 @@ VoxelBox octree_box(uint tree, ivec3 cell) {
     return VoxelBox(low, low + (side - 1), found, node);
 }
 
+// From start to end, with as many steps as no walk exceeds.
 OctreeWalk octree_walk(vec3 start, vec3 end) {
-    return OctreeWalk(start, end - start, octree_cell(start), octree_cell(end), 0.0);
-}
-
-// No walk takes more steps than this.
-int octree_most_steps() {
-    return 3 * (1 << octree_words[1]) + 8;
+    return OctreeWalk(start, end - start, octree_cell(start), octree_cell(end), 0.0, 3 * (1 << octree_words[1]) + 8);
 }
 
 // Moves a walk out of the cube of voxels from `low` to `high` that holds its cell, or returns false: it ends in there.
@@ -110,22 +108,24 @@ bool octree_leave(inout OctreeWalk walk, ivec3 low, ivec3 high) {
     next[axis] = far[axis] + way[axis];
     walk.cell = next;
     walk.fraction = least;
+    --walk.steps;
     return true;
+}
+
+// Moves a walk to the next occupied voxel of a tree, its own included, and returns its box; or a box that is not occupied
+// where there is none up to its end.
+VoxelBox octree_next(uint tree, inout OctreeWalk walk) {
+    VoxelBox box = octree_box(tree, walk.cell);
+    while (!box.occupied && walk.steps > 0 && octree_leave(walk, box.low, box.high)) {
+        box = octree_box(tree, walk.cell);
+    }
+    return box;
 }
 
 // Whether one tree has no occupied voxel between two points in voxel coordinates, the points' own voxels included.
 bool octree_tree_clear(uint tree, vec3 start, vec3 end) {
     OctreeWalk walk = octree_walk(start, end);
-    for (int i = octree_most_steps(); i > 0; --i) {
-        VoxelBox box = octree_box(tree, walk.cell);
-        if (box.occupied) {
-            return false;
-        }
-        if (!octree_leave(walk, box.low, box.high)) {
-            return true;
-        }
-    }
-    return false;
+    return !octree_next(tree, walk).occupied && walk.steps > 0;
 }
 
 // Whether no tree has an occupied voxel between two points in voxel coordinates, the points' own voxels included.

@@ -16,6 +16,7 @@ layout(std430, binding = OCTREE_TRIANGLE_BINDING) readonly buffer OctreeTriangle
 
 // More than any fraction of a way: it meets nothing.
 #define OCTREE_NO_CROSSING 2.0
+#define OCTREE_NO_TRIANGLE 0xFFFFFFFFu
 
 // A way from start to start + along as triangles see it. axis: its longest one; slope: of the others along that.
 struct OctreeRay {
@@ -132,12 +133,15 @@ uvec2 octree_list(uint tree, uint brick, ivec3 cell) {
     return octree_triangle_words[4u * tree + 2u] + uvec2(octree_triangle_words[start], octree_triangle_words[start + 1u]);
 }
 
-// Whether a way meets a triangle of a list.
-bool octree_list_blocks(uint tree, uvec2 list, OctreeRay ray, float slack) {
+// Whether a way meets a triangle of a list. asked: the triangle that was asked last, often that of the next voxel too.
+bool octree_list_blocks(uint tree, uvec2 list, OctreeRay ray, float slack, inout uint asked) {
     for (uint i = list.x; i < list.y; ++i) {
-        uint word = octree_triangle_word(tree, octree_triangle_words[i]);
-        if (octree_crossing(ray, octree_triangle(word), slack) <= 1.0) {
-            return true;
+        uint triangle = octree_triangle_words[i];
+        if (triangle != asked) {
+            asked = triangle;
+            if (octree_crossing(ray, octree_triangle(octree_triangle_word(tree, triangle)), slack) <= 1.0) {
+                return true;
+            }
         }
     }
     return false;
@@ -148,16 +152,16 @@ bool octree_tree_open(uint tree, vec3 start, vec3 end) {
     OctreeWalk walk = octree_walk(start, end);
     OctreeRay ray = octree_ray(start, end);
     float slack = octree_edge_slack();
-    for (int i = octree_most_steps(); i > 0; --i) {
-        VoxelBox box = octree_box(tree, walk.cell);
-        if (box.occupied && octree_list_blocks(tree, octree_list(tree, box.brick, walk.cell), ray, slack)) {
+    uint asked = OCTREE_NO_TRIANGLE;
+    bool goes_on = true;
+    while (goes_on && walk.steps > 0) {
+        VoxelBox box = octree_next(tree, walk);
+        if (box.occupied && octree_list_blocks(tree, octree_list(tree, box.brick, walk.cell), ray, slack, asked)) {
             return false;
         }
-        if (!octree_leave(walk, box.low, box.high)) {
-            return true;
-        }
+        goes_on = box.occupied && octree_leave(walk, box.low, box.high);
     }
-    return false;
+    return !goes_on;
 }
 
 // Whether no triangle is on the way between two points in voxel coordinates.
@@ -217,14 +221,13 @@ OctreeCrossing octree_tree_nearest(uint tree, vec3 start, vec3 end, OctreeCrossi
     OctreeWalk walk = octree_walk(start, end);
     OctreeRay ray = octree_ray(start, end);
     float slack = octree_edge_slack();
-    for (int i = octree_most_steps(); i > 0 && walk.fraction <= found.fraction; --i) {
-        VoxelBox box = octree_box(tree, walk.cell);
+    bool goes_on = true;
+    while (goes_on && walk.steps > 0 && walk.fraction <= found.fraction) {
+        VoxelBox box = octree_next(tree, walk);
         if (box.occupied) {
             found = octree_list_nearest(tree, octree_list(tree, box.brick, walk.cell), ray, slack, found);
         }
-        if (!octree_leave(walk, box.low, box.high)) {
-            return found;
-        }
+        goes_on = box.occupied && octree_leave(walk, box.low, box.high);
     }
     return found;
 }

@@ -44,9 +44,9 @@ def build_exact(device, shapes, depth, reflectance=None):
         return trees, lists, buffers
 
 
-def ask_exact(device, expression, inputs, components=1):
+def ask_exact(device, expression, inputs, components=1, preamble=""):
     """`expression` of lib/octree_triangles.glsl for each row, with the octree and the triangles that are bound."""
-    return evaluate(device, EXACT_PATH, expression, inputs, components, defines=EXACT_DEFINES)
+    return evaluate(device, EXACT_PATH, expression, inputs, components, preamble, EXACT_DEFINES)
 
 
 def bind(device, buffer):
@@ -54,9 +54,9 @@ def bind(device, buffer):
         buffer.bind_to_storage_buffer(BINDING)
 
 
-def ask(device, expression, inputs, components=1):
+def ask(device, expression, inputs, components=1, preamble=""):
     """`expression` of lib/octree.glsl for each row, with the octree that is bound."""
-    return evaluate(device, PATH, expression, inputs, components, defines=DEFINES)
+    return evaluate(device, PATH, expression, inputs, components, preamble, DEFINES)
 
 
 def clear_on_device(device, starts, ends, at_once=1 << 17):

@@ -12,6 +12,8 @@ from vlm_addon.core.octree_march import (
     boxes_at,
     cells_at,
     lifted,
+    lifted_by,
+    next_cells,
     reaches,
     segments_clear,
     surfaces_see,
@@ -95,6 +97,47 @@ def test_octree_occupied_in_either_tree(device):
     assert (each[1] & ~each[0]).any()
 
 
+def test_octree_walk_begins_and_ends_in_the_voxels_of_its_ends(device, tree):
+    starts, ends = segments(500, np.random.default_rng(11))
+    for part, expected in (("cell", cells_at(starts)), ("last", cells_at(ends)), ("along", ends - starts)):
+        found = ask(device, f"vec3(octree_walk(a, b).{part})", {"a": starts, "b": ends}, 3)
+        assert np.array_equal(found, expected)
+
+
+LEAVE = """
+vec4 left_box(vec3 a, vec3 b) {
+    OctreeWalk walk = octree_walk(a, b);
+    VoxelBox box = octree_box(0u, walk.cell);
+    bool goes_on = octree_leave(walk, box.low, box.high);
+    return vec4(walk.cell, float(goes_on));
+}
+vec4 next_box(vec3 a, vec3 b) {
+    OctreeWalk walk = octree_walk(a, b);
+    VoxelBox box = octree_next(0u, walk);
+    return vec4(walk.cell, float(box.occupied));
+}
+"""
+
+
+def test_octree_leave_is_the_step_of_core(device, tree):
+    starts, ends = segments(4000, np.random.default_rng(12))
+    found = ask(device, "left_box(a, b)", {"a": starts, "b": ends}, 4, LEAVE)
+    cells = cells_at(starts)
+    boxes = boxes_at(tree, cells)
+    rows, moved = next_cells(np.arange(len(starts)), cells, boxes.low, boxes.high, starts, ends)
+    assert np.array_equal(np.flatnonzero(found[:, 3]), rows)
+    assert (found[rows, :3] != moved).any(axis=1).mean() < 1e-3
+    assert 100 < len(rows) < 3900
+
+
+def test_octree_next_stands_in_an_occupied_voxel_where_a_way_is_not_clear(device, tree):
+    starts, ends = segments(2000, np.random.default_rng(13))
+    found = ask(device, "next_box(a, b)", {"a": starts, "b": ends}, 4, LEAVE)
+    clear = clear_on_device(device, starts, ends)
+    assert np.array_equal(found[:, 3] > 0.5, ~clear)
+    assert boxes_at(tree, found[~clear, :3].astype(np.int64)).occupied.all()
+
+
 def test_octree_tree_clear_is_the_walk_of_core(device, tree):
     starts, ends = segments(4000, np.random.default_rng(5))
     found = ask(device, "float(octree_tree_clear(0u, a, b))", {"a": starts, "b": ends}) > 0.5
@@ -150,6 +193,15 @@ def test_octree_lifted(device, tree):
     found = ask(device, "octree_lifted(p, n, q, m)", inputs, 3)
     expected = lifted(*(values.astype(float) for values in inputs.values()))
     assert found == pytest.approx(expected, abs=1e-4)
+
+
+def test_octree_lifted_by(device, tree):
+    inputs = surface_pairs(4000, np.random.default_rng(14))
+    found = ask(device, "octree_lifted_by(0.25, p, n, 0.5, q, m)", inputs, 3)
+    own, other = np.full(4000, 0.25), np.full(4000, 0.5)
+    assert found == pytest.approx(
+        lifted_by(own, other, *(values.astype(float) for values in inputs.values())), abs=1e-4
+    )
 
 
 def test_octree_surfaces_see(device, tree):

@@ -93,18 +93,31 @@ def segments_clear(tree: VoxelOctree, starts: Floats, ends: Floats) -> Bools:
     False for what is not finite. The arithmetic is that of the points' type: float32 as on the device.
     """
     clear = np.zeros(len(starts), bool)
-    rows = np.flatnonzero(np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1))
-    cells, lasts = cells_at(starts[rows]), cells_at(ends[rows])
+    rows = finite_segments(starts, ends)
+    cells = cells_at(starts[rows])
     while len(rows):
         boxes = boxes_at(tree, cells)
-        step = np.sign(lasts - cells)
-        far = np.where(step > 0, boxes.high, boxes.low)
-        leaves = ((step > 0) & (lasts > far)) | ((step < 0) & (lasts < far))
         clear[rows] = ~boxes.occupied
-        going = ~boxes.occupied & leaves.any(axis=1)
-        rows, step, far, leaves, lasts = rows[going], step[going], far[going], leaves[going], lasts[going]
-        cells = _next_cells(cells[going], starts[rows], ends[rows], far, step, leaves, lasts)
+        going = ~boxes.occupied
+        rows, cells = next_cells(rows[going], cells[going], boxes.low[going], boxes.high[going], starts, ends)
     return clear
+
+
+def finite_segments(starts: Floats, ends: Floats) -> Int64:
+    """Rows of those whose ends are finite."""
+    return np.flatnonzero(np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1))
+
+
+def next_cells(rows: Int64, cells: Int64, low: Int64, high: Int64, starts: Floats, ends: Floats) -> tuple[Int64, Int64]:
+    """The ways that go on beyond the cubes of voxels from `low` to `high` that hold their cells, and where they are
+    then. rows: (n,) of starts and ends; the rest for each of those."""
+    lasts = cells_at(ends[rows])
+    step = np.sign(lasts - cells)
+    far = np.where(step > 0, high, low)
+    leaves = ((step > 0) & (lasts > far)) | ((step < 0) & (lasts < far))
+    going = leaves.any(axis=1)
+    rows, step, far, leaves, lasts = rows[going], step[going], far[going], leaves[going], lasts[going]
+    return rows, _next_cells(cells[going], starts[rows], ends[rows], far, step, leaves, lasts)
 
 
 def _next_cells(
@@ -132,14 +145,20 @@ def reaches(normals: Floats) -> Floats:
 
 
 def lifted(places: Floats, normals: Floats, others: Floats, other_normals: Floats) -> Floats:
-    """(n, 3) where ways from surface points to others begin, in voxel coordinates.
+    """(n, 3) where ways from surface points to others begin, in voxel coordinates: as `lifted_by` by the reach of each,
+    so that neither surface's voxels stand in the way, nor floor and wall where they meet."""
+    return lifted_by(reaches(normals), reaches(other_normals), places, normals, others, other_normals)
 
-    Over their own plane and over the other's by the reach of each, so that neither surface's voxels stand in the way,
-    nor floor and wall where they meet. Normals are unit and geometric, or zero for a point in space. A point moves by
-    its own reach and at most twice the other's.
+
+def lifted_by(
+    own: Floats, other: Floats, places: Floats, normals: Floats, others: Floats, other_normals: Floats
+) -> Floats:
+    """(n, 3) places moved over their own plane by (n,) `own` and over the other's by `other`.
+
+    Normals are unit and geometric, or zero for a point in space. A point moves by `own` and at most twice `other`.
     """
-    begins = places + normals * reaches(normals)[:, None]
-    missing = reaches(other_normals) - np.einsum("ij,ij->i", other_normals, begins - others)
+    begins = places + normals * own[:, None]
+    missing = other - np.einsum("ij,ij->i", other_normals, begins - others)
     # Along the other normal, but not back towards the own plane. Planes that face each other have no such way.
     facing = np.minimum(np.einsum("ij,ij->i", normals, other_normals), 0.0)
     share = np.maximum(missing, 0.0) / np.maximum(1.0 - facing * facing, 0.25)

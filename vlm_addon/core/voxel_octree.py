@@ -12,6 +12,7 @@ same tree, bit for bit. Octants are x + 2 y + 4 z; a voxel's place in its brick 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,8 +94,13 @@ def require_places(places: Float64, depth: int) -> None:
 
 def voxel_codes(places: Float64, depth: int, growth: float = 0.0) -> Int64:
     """(v,) int64 ascending places along the Z-order curve of the voxels that meet a triangle; as `build_octree`."""
+    found = [np.unique(codes) for _, codes in meeting_voxels(places, depth, growth)]
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
+
+
+def meeting_voxels(places: Float64, depth: int, growth: float = 0.0) -> Iterator[tuple[Int64, Int64]]:
+    """Triangles and voxels of all pairs that meet, in parts: triangles, and places along the Z-order curve."""
     blocks = starting_blocks(places, depth, depth, growth)
-    found = [np.zeros(0, np.int64)]
     waiting = [
         (level, np.flatnonzero(blocks.levels == level), blocks.cells[blocks.levels == level])
         for level in np.unique(blocks.levels).tolist()
@@ -105,10 +111,9 @@ def voxel_codes(places: Float64, depth: int, growth: float = 0.0) -> Int64:
             part = slice(start, start + _BLOCKS_AT_ONCE)
             meeting = _cells_that_meet(places, triangles[part], cells[part], depth - level, growth)
             if level == depth:
-                found.append(np.unique(codes_of(meeting[1])))
+                yield meeting[0], codes_of(meeting[1])
             else:
                 waiting.append((level + 1, meeting[0], 2 * meeting[1]))
-    return np.unique(np.concatenate(found))
 
 
 def _cells_that_meet(
