@@ -28,7 +28,7 @@ class MapSettings:
         8,
         2048,
         "Along each face of a map all around a lamp, to the nearest power of two; a map of one view has twice as many "
-        "along each side, one of an area lamp half",
+        "along each side, one of an area lamp half, one of a wide part of the world a quarter",
         source="001, 4; 003, 6.2.2",
     )
     area_maps: int = setting(

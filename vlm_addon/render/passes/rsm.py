@@ -26,7 +26,7 @@ from ..map_fluxes import MapFluxes, measured_fluxes
 from ..rsm_views import FaceView, face_views, map_tiles
 from ..shader_library import ShaderLibrary, set_uniforms
 from .gbuffer import GBufferPass
-from .shadow_map import SINGLE_TILE_FACTOR, SOFT_DIVISOR
+from .shadow_map import SHARP_ANGLE, SINGLE_TILE_FACTOR, SOFT_DIVISOR, WORLD_DIVISOR
 
 if TYPE_CHECKING:
     import moderngl
@@ -127,7 +127,7 @@ class ReflectiveShadowMapPass:
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
         """resolution: texels along a cube's face, taken to the nearest power of two; a map of one tile has twice as
-        many, area lamps half."""
+        many, area lamps half, wide parts of the world a quarter: many of those are added up."""
         self._context = context
         self._shaders = shaders
         most = int(context.info["GL_MAX_TEXTURE_SIZE"]) // 4
@@ -143,7 +143,10 @@ class ReflectiveShadowMapPass:
     def side(self, geometry: GpuGeometry, light: Light) -> int:
         """Texels along a face of the maps of `light`."""
         face = self.face if map_tiles(light, geometry) != (1, 1) else self.face * SINGLE_TILE_FACTOR
-        return max(face // SOFT_DIVISOR, LEAST_FACE) if light.kind == AREA else face
+        divisor = SOFT_DIVISOR if light.kind == AREA else 1
+        if light.from_world and light.angle > SHARP_ANGLE:
+            divisor = WORLD_DIVISOR
+        return max(face // divisor, LEAST_FACE)
 
     def size(self, geometry: GpuGeometry, light: Light) -> tuple[int, int]:
         """Width and height of the maps of `light`, texels."""
