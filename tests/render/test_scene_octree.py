@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.render.octree_rays import ask, bind, clear_on_device
+from tests.render.octree_rays import BINDING, TRIANGLE_BINDING, ask, ask_exact, bind, clear_on_device
 from tests.render.rooms import quad
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.octree_march import segments_clear
@@ -72,8 +72,41 @@ def test_only_what_moves_is_built_again(device):
 
 def test_a_scene_that_does_not_move_is_one_tree(device):
     octree = made(device, scene(dynamic=False), Kept())
-    assert len(octree.trees) == 1
+    assert len(octree.trees) == len(octree.lists) == 1
     assert octree.buffer is octree.trees[0].buffer
+    assert octree.triangles is octree.lists[0].buffer
+
+
+def coloured(snapshot, mesh, colour):
+    """`snapshot` with another reflectance of one of its meshes."""
+    meshes = list(snapshot.meshes)
+    reflectance = np.full((len(meshes[mesh].triangles), 3), colour, np.float32)
+    meshes[mesh] = replace(meshes[mesh], reflectance=reflectance)
+    return replace(snapshot, meshes=tuple(meshes))
+
+
+def test_first_hits_are_those_of_all_triangles_and_their_colours(device):
+    """Down to the plate, which moves, and beside it to the floor."""
+    kept = Kept()
+    snapshot = coloured(coloured(scene(), 0, 0.25), 2, 0.75)
+    octree = made(device, snapshot, kept)
+    rng = np.random.default_rng(3)
+    points = np.column_stack([rng.uniform(-1.9, 1.9, (500, 2)), np.full(500, 2.0)])
+    with device.current():
+        octree.bind(BINDING, TRIANGLE_BINDING)
+    inputs = {"p": octree.frame.voxels(points), "d": np.tile([[0.0, 0.0, -1.0]], (500, 1))}
+    found = ask_exact(device, "vec4(octree_first_hit(p, vec3(0.0), d).reflectance, 0.0)", inputs, 4)[:, 0]
+    over_plate = (np.abs(points[:, :2]) < 1.0).all(axis=1)
+    assert np.array_equal(found, np.where(over_plate, 0.75, 0.25))
+    assert 20 < over_plate.sum() < 480
+
+
+def test_another_colour_is_built_again(device):
+    kept, snapshot = Kept(), scene()
+    for colour in (0.25, 0.25, 0.5):
+        made(device, coloured(snapshot, 2, colour), kept)
+    assert kept.built["static_octree"] == 1
+    assert kept.built["dynamic_octree"] == 2
 
 
 def test_what_is_wholly_transparent_is_left_out(device):
@@ -105,7 +138,8 @@ def test_counters_tell_nodes_and_memory(device):
     assert counters["octree_nodes"] == sum(tree.node_count for tree in octree.trees) > 2
     words = sum(tree.node_count + 2 * tree.brick_count for tree in octree.trees)
     assert counters["octree_mb"] == pytest.approx(4e-6 * words)
-    assert counters["octree_device_mb"] >= counters["octree_mb"]
+    assert counters["octree_triangle_mb"] > 0.0
+    assert counters["octree_device_mb"] >= counters["octree_mb"] + counters["octree_triangle_mb"]
 
 
 def test_an_empty_scene_blocks_nothing(device):

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from tests.voxel_scenes import box, soup, sphere, torus
+from vlm_addon.core.brick_triangles import build_exact_octree
 from vlm_addon.core.errors import DeviceError, InvalidInput
 from vlm_addon.core.voxel_octree import build_octree, codes_of, tree_of_codes
 from vlm_addon.render import growing_buffer
 from vlm_addon.render.growing_buffer import GrowingBuffer
-from vlm_addon.render.passes.voxelize import VoxelizePass, growth_of
+from vlm_addon.render.passes.voxelize import VoxelizePass, growth_of, triangle_records
 
 BORDER = 1e-3
 """Voxels: how far from a triangle a voxel may be that is found and should not be."""
@@ -151,6 +152,86 @@ def test_join_copies_both_trees(device):
             host = tree.read()
             assert np.array_equal(words[first : first + tree.node_count], host.nodes)
             assert np.array_equal(words[bricks : bricks + 2 * tree.brick_count], host.bricks.view(np.uint32))
+
+
+def lists_of(device, shape, depth, reflectance=None, target=None):
+    colours = np.zeros((len(shape), 3), np.float32) if reflectance is None else reflectance
+    with device.current() as context:
+        builder = VoxelizePass(context, device.shaders)
+        targets = GrowingBuffer(context, "octree"), target or GrowingBuffer(context, "triangles")
+        tree, lists = builder.build_with_lists(shape, colours, depth, *targets)
+        return tree.read(), lists, lists.read()
+
+
+@pytest.mark.parametrize("shape", [soup(250, 6, np.random.default_rng(6)), torus(6), np.zeros((0, 3, 3))])
+def test_lists_hold_the_triangles_of_each_voxel(device, shape):
+    """Those of the oracle, once each, and none but those of the oracle with voxels that are larger by BORDER."""
+    tree, _, (starts, triangles, _records) = lists_of(device, shape, 6)
+    codes = codes_of(tree.voxels())
+    assert len(starts) == len(codes) + 1
+    pairs = np.stack([np.repeat(codes, np.diff(starts.astype(int))), triangles.astype(int)], axis=1)
+    keys = pairs[:, 0] * (len(shape) + 1) + pairs[:, 1]
+    assert len(np.unique(keys)) == len(keys)
+    for growth, found, among in ((0.0, None, keys), (BORDER, keys, None)):
+        octree = build_exact_octree(shape, 6, growth)
+        listed = np.repeat(octree.codes, np.diff(octree.starts)) * (len(shape) + 1) + octree.triangles
+        assert np.isin(listed if found is None else found, listed if among is None else among).all()
+
+
+def test_records_are_corners_normals_and_reflectance(device):
+    shape, colours = torus(6), np.random.default_rng(7).uniform(size=(len(torus(6)), 3)).astype(np.float32)
+    records = lists_of(device, shape, 6, colours)[2][2]
+    assert np.array_equal(records[:, :3], triangle_records(shape, 6))
+    assert np.array_equal(records[:, 3, :3], colours)
+
+
+def test_the_tree_is_the_same_with_and_without_lists(device):
+    tree = lists_of(device, torus(6), 6)[0]
+    with device.current() as context:
+        alone = VoxelizePass(context, device.shaders).build(torus(6), 6, GrowingBuffer(context, "octree")).read()
+    assert np.array_equal(tree.nodes, alone.nodes)
+    assert np.array_equal(tree.bricks, alone.bricks)
+
+
+def test_lists_grow_and_never_shrink(device):
+    with device.current() as context:
+        target = GrowingBuffer(context, "triangles")
+    sizes = []
+    for radius in (0.02, 0.45, 0.02):
+        ball = sphere(6, radius=radius, rings=8)
+        starts, triangles, _ = lists_of(device, ball, 6, target=target)[2]
+        assert starts[-1] == len(triangles)
+        assert set(triangles.tolist()) == set(range(len(ball)))
+        sizes.append(target.nbytes)
+    assert sizes[0] < sizes[1] == sizes[2]
+
+
+def test_join_lists_copies_both(device):
+    with device.current() as context:
+        builder, lists = VoxelizePass(context, device.shaders), []
+        for shape in (sphere(6, rings=8), torus(6)):
+            targets = GrowingBuffer(context, "octree"), GrowingBuffer(context, "triangles")
+            lists.append(builder.build_with_lists(shape, np.zeros((len(shape), 3)), 6, *targets)[1])
+        words = np.frombuffer(builder.join_lists(lists, GrowingBuffer(context, "joined")).read(), np.uint32)
+        for index, part in enumerate(lists):
+            _, starts, triangles, records = words[4 * index : 4 * index + 4].tolist()
+            expected = part.read()
+            assert np.array_equal(words[starts : starts + part.voxel_count + 1], expected[0])
+            assert np.array_equal(words[triangles : triangles + part.pair_count], expected[1])
+            assert np.array_equal(
+                words[records : records + 16 * part.triangle_count], expected[2].ravel().view(np.uint32)
+            )
+
+
+def test_lists_that_no_block_holds_are_refused(device, monkeypatch):
+    with device.current() as context:
+        builder = VoxelizePass(context, device.shaders)
+        target, lists = GrowingBuffer(context, "octree"), GrowingBuffer(context, "its triangles")
+        ball = sphere(6)
+        # As much as the voxelisation itself needs.
+        monkeypatch.setattr(growing_buffer, "_limit", lambda context: 160_000)
+        with pytest.raises(DeviceError, match="its triangles needs a block"):
+            builder.build_with_lists(ball, np.zeros((len(ball), 3)), 6, target, lists)
 
 
 def test_trees_of_different_depths_are_not_joined(device):
