@@ -10,9 +10,10 @@ bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 from mathutils import Vector  # noqa: E402
 from mathutils.bvhtree import BVHTree  # noqa: E402
 
-from tests.render.octree_rays import build, clear_on_device  # noqa: E402
-from tests.voxel_scenes import torus  # noqa: E402
+from tests.render.octree_rays import ask_exact, build, build_exact, clear_on_device  # noqa: E402
+from tests.voxel_scenes import surface_points, torus  # noqa: E402
 from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.core.brick_triangles import ALL_EXACT, LIFT_SHARE  # noqa: E402
 from vlm_addon.core.voxel_frame import make_voxel_frame  # noqa: E402
 from vlm_addon.core.voxel_octree import codes_of, voxel_codes  # noqa: E402
 from vlm_addon.render.device import Device  # noqa: E402
@@ -124,7 +125,7 @@ def check_rays(device, places, depth, count):
     size = float(1 << depth)
     # What Blender casts at is in float32, as the segments are.
     exact = places.astype(np.float32).astype(float)
-    tree = BVHTree.FromPolygons(exact.reshape(-1, 3).tolist(), np.arange(3 * len(exact)).reshape(-1, 3).tolist())
+    tree = blender_tree(exact)
     bound = build(device, exact, depth)
     starts = rng.uniform(0.0, size, (count, 3)).astype(np.float32)
     ends = starts + rng.normal(size=(count, 3)) * size * 2.0 ** rng.uniform(-4.0, 0.0, (count, 1))
@@ -154,6 +155,54 @@ def comes_near(tree, start, end, zone):
             if tree.find_nearest(Vector(start + share * way), zone)[0] is not None:
                 return True
     return False
+
+
+def blender_tree(places):
+    return BVHTree.FromPolygons(places.reshape(-1, 3).tolist(), np.arange(3 * len(places)).reshape(-1, 3).tolist())
+
+
+def facing_pairs(places, count):
+    """Surface points that face each other: place, normal, place and normal in float32."""
+    rng = np.random.default_rng(1)
+    (p, n), (q, m) = surface_points(places, count, rng), surface_points(places, count, rng)
+    faces = (((q - p) * n).sum(axis=1) > 1e-3) & (((q - p) * m).sum(axis=1) < -1e-3)
+    return [values[faces].astype(np.float32) for values in (p, n, q, m)]
+
+
+def check_exact(device, places, depth, count):
+    """Pairs of surface points, and first hits along random ways from one of them: as Blender's own rays say, but where
+    those graze the surface that they begin on, which for float32 is a matter of where they are begun."""
+    tree, lift = blender_tree(places), LIFT_SHARE * (1 << depth)
+    kept = build_exact(device, [places], depth)
+    p, n, q, m = facing_pairs(places, count)
+    seen = (
+        ask_exact(device, f"float(octree_points_see(p, n, q, m, {ALL_EXACT}))", {"p": p, "n": n, "q": q, "m": m}) > 0.5
+    )
+    starts, ends = p.astype(float) + lift * n, q.astype(float) + lift * m
+    hits = np.array([is_hit(tree, a, b) for a, b in zip(starts, ends, strict=True)])
+    assert (seen == hits).mean() <= 1e-3
+    assert 0 < seen.sum() < len(seen)
+    way = np.random.default_rng(2).normal(size=p.shape)
+    way *= (np.sign((way * n).sum(axis=1)) / np.linalg.norm(way, axis=1))[:, None]
+    inputs = {"p": p, "n": n, "d": way.astype(np.float32)}
+    found = ask_exact(device, "octree_first_hit(p, n, d).distance * float(octree_first_hit(p, n, d).found)", inputs)
+    lengths = [
+        tree.ray_cast(Vector(a), Vector(d))[3] or 0.0 for a, d in zip(starts, inputs["d"].astype(float), strict=True)
+    ]
+    assert (np.abs(found - lengths) > 0.01).mean() <= 1e-3
+    assert np.count_nonzero(lengths) > 0.01 * len(lengths)
+    del kept
+
+
+def test_exact_ways_in_a_torus_are_blenders(device):
+    check_exact(device, torus(7), 7, 60_000)
+
+
+@pytest.mark.parametrize("name", ["cornell_box", "monkey_box"])
+def test_exact_ways_in_a_sample_are_blenders(device, name):
+    snapshot = opened(name)
+    frame = make_voxel_frame(snapshot.bounds(), 64)
+    check_exact(device, places_of(snapshot.meshes, frame), frame.depth, 20_000)
 
 
 def test_rays_around_a_torus(device):
