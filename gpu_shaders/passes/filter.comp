@@ -94,21 +94,30 @@ ClassMean class_mean(ivec2 pixel, Place place, ivec2 step) {
 }
 
 // How much the values grow for a pixel along an axis, a unit vector: the mean over pairs of one class, which used the
-// same lights, so that the pattern is no part of it. 0 where there is no pair, or where it is not needed.
+// same lights, so that the pattern is no part of it. Less of it where the pairs disagree, by how uncertain that makes
+// their mean (James and Stein's estimator). 0 where there are no two pairs, or where it is not needed.
 vec4 slope_along(ivec2 pixel, Place place, ivec2 axis, bool is_needed) {
     vec4 sum = vec4(0.0);
-    float count = 0.0;
+    float squares = 0.0, count = 0.0;
     for (int along = is_needed ? -INTERLEAVE : 1; along <= 0; ++along) {
         for (int across = -(INTERLEAVE / 2); across <= INTERLEAVE / 2; ++across) {
             ivec2 first = along * axis + across * (1 - axis);
             vec4 from, to;
             if (counts(pixel, place, first, from) && counts(pixel, place, first + INTERLEAVE * axis, to)) {
-                sum += to - from;
+                vec4 growth = (to - from) / float(INTERLEAVE);
+                sum += growth;
+                squares += dot(growth.rgb, growth.rgb);
                 count += 1.0;
             }
         }
     }
-    return sum / (max(count, 1.0) * float(INTERLEAVE));
+    if (count < 2.0) {
+        return vec4(0.0);
+    }
+    vec4 mean = sum / count;
+    float size = dot(mean.rgb, mean.rgb);
+    float uncertainty = max(squares / count - size, 0.0) / (count - 1.0);
+    return uncertainty < size ? mean * (1.0 - uncertainty / size) : vec4(0.0);
 }
 
 vec4 mean_of_classes(ivec2 pixel) {

@@ -77,7 +77,7 @@ def filtered(surface: Surface, values: np.ndarray, n: int, reach: Float64, least
 
 
 def _slope(neighbours: Neighbours, n: int, axis: int) -> Float64:
-    """(h, w, c) growth for each pixel to the right or down, of pairs n apart."""
+    """(h, w, c) growth for each pixel to the right or down, of pairs n apart, less of it the less certain it is."""
     pairs = [
         (neighbours.at(*_turned(along, across, axis)), neighbours.at(*_turned(along + n, across, axis)))
         for along in range(-n, 1)
@@ -85,7 +85,13 @@ def _slope(neighbours: Neighbours, n: int, axis: int) -> Float64:
     ]
     both = [(one & other, last - first) for (one, first), (other, last) in pairs]
     count = sum(pair.astype(float) for pair, _ in both)
-    return sum(np.where(pair, difference, 0.0) for pair, difference in both) / np.maximum(count, 1) / n
+    growths = np.stack([np.where(pair, difference / n, np.nan) for pair, difference in both])
+    mean = np.nansum(growths, axis=0) / np.maximum(count, 1)
+    spread = np.nansum((growths - mean)[..., :3] ** 2, axis=(0, 3))[..., None]
+    size = (mean[..., :3] ** 2).sum(axis=2, keepdims=True)
+    uncertainty = spread / np.maximum(count * (count - 1), 1)
+    share = np.maximum(1.0 - uncertainty / np.where(size > 0.0, size, np.inf), 0.0)
+    return np.where(count > 1, mean * share, 0.0)
 
 
 def _turned(along: int, across: int, axis: int) -> tuple[int, int]:

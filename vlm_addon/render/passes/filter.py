@@ -9,8 +9,8 @@ tell, for both pixels alike.
 
 At edges that leaves two errors. A class that has nothing within n / 2 pixels is looked for within n: without it the
 other classes' lights would count for more. And the pixels that count lie on one side, so their mean is that of a place
-inside; it is moved back along the slope. Pixels of one class used the same lights, so differences between them show the
-slope without the pattern.
+inside; it is moved back along the slope, as far as that is certain. Pixels of one class used the same lights, so
+differences between them show the slope without the pattern.
 
 Values that are not numbers, infinite or beyond LARGEST are left out, so none spreads; their pixels get what their
 neighbours have, as any other pixel.
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 GROUP_SIDE = 8
 COUNT_BINDING = 0
 VALUE_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
-LARGEST = 1e36
-"""Of usable values: as many as the widest kernel has can be added in float32."""
+LARGEST = 1e17
+"""Of usable values: the squares of as many as the widest kernel has can be added in float32."""
 GEOMETRY, NONE = "geometry", "none"
 WITH_FILTER = ("filter", GEOMETRY)
 
@@ -95,8 +95,8 @@ class GeometryFilterPass:
         """The mean for each pixel, RGBA32F, 0 where no surface shows or nothing usable is near; `texture` itself where
         the filter is off.
 
-        gbuffer, texture: of the picture's size, RGBA32F, each channel of which is filtered. view: that the G-buffer
-        was drawn through. The next call overwrites the texture returned.
+        gbuffer, texture: of the picture's size, RGBA32F; each channel is filtered, alpha has no say in how. view: that
+        the G-buffer was drawn through. The next call overwrites the texture returned.
         """
         if settings.filter == NONE:
             return texture
