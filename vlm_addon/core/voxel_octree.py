@@ -63,11 +63,19 @@ class VoxelOctree:
 
     def voxels(self) -> Int64:
         """(v, 3) the voxels that hold a piece of a triangle, in the tree's order."""
-        codes = np.zeros(1, np.int64)
-        for level in range(self.depth - BRICK_LEVELS):
-            masks = self.nodes[self.level_starts[level] : self.level_starts[level + 1]] & CHILD_MASK
+        return self.cells(self.depth)
+
+    def cells(self, level: int) -> Int64:
+        """(n, 3) the cells of 2^level along each axis that hold a piece of a triangle, in the tree's order."""
+        codes = np.zeros(int(len(self.bricks) > 0), np.int64)
+        for upper in range(min(level, self.depth - BRICK_LEVELS)):
+            masks = self.nodes[self.level_starts[upper] : self.level_starts[upper + 1]] & CHILD_MASK
             codes = _expanded(codes, masks[:, None].astype(np.uint8))
-        codes = _expanded(codes, self.bricks.view(np.uint8).reshape(-1, 8))
+        octants = self.bricks.view(np.uint8).reshape(-1, 8)
+        if level == self.depth - 1:
+            codes = _expanded(codes, np.packbits(octants > 0, axis=1, bitorder="little"))
+        elif level == self.depth:
+            codes = _expanded(codes, octants)
         return np.stack([_gathered_bits(codes >> axis) for axis in range(3)], axis=1)
 
 
