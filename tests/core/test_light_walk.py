@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.render.rooms import quad
 from vlm_addon.core.errors import InvalidInput
-from vlm_addon.core.light_walk import bounce_counts, surface_means
+from vlm_addon.core.light_walk import bounce_counts, bounce_shift, surface_means
 
 COUNTS = st.integers(1, 70_000)
 BLOCKS = st.integers(1, 64)
@@ -68,3 +68,19 @@ def test_no_surface_has_no_area_and_reflects_nothing() -> None:
     found = surface_means([])
     assert found.area == 0.0
     assert not found.reflectance.any()
+
+
+def test_the_first_bounce_keeps_its_shift() -> None:
+    assert bounce_shift((0.25, 0.75), 1) == (0.25, 0.75)
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_shifts_of_bounces_are_even_and_independent_of_the_first(number: int) -> None:
+    """Of 36 x 36 pairs of old and new coordinate each has its share."""
+    for axis in (0, 1):
+        first = np.random.default_rng(axis).random(60_000)
+        found = np.array([bounce_shift((value, value), number)[axis] for value in first])
+        assert ((found >= 0.0) & (found < 1.0)).all()
+        filled, _, _ = np.histogram2d(first, found, bins=36, range=((0, 1), (0, 1)))
+        expected = len(first) / 36**2
+        assert ((filled - expected) ** 2 / expected).sum() < 36**2 + 4.0 * np.sqrt(2.0 * 36**2)

@@ -22,6 +22,8 @@ LAMP = Light("point", POINT, (45.0, 30.0, 20.0), (0.4, -0.3, 0.9))
 GREY = np.array([0.5, 0.25, 0.75])
 BLOCK_LOW, BLOCK_HIGH = (-0.6, -0.5, -1.25), (0.3, 0.6, 0.1)
 BLOCK_REFLECTANCE = (0.2, 0.7, 0.4)
+FLOOR_WALL = 4
+"""Among those of wall_points."""
 DOWN = Light("sun", SUN, (2.0, 2.0, 2.0), (0.0, 0.0, 0.0))
 WHITE = Material("white", DIFFUSE, (0.8, 0.8, 0.8))
 SHIFTS = [tuple(shift) for shift in np.random.default_rng(8).random((16, 2)).tolist()]
@@ -135,7 +137,7 @@ def radiosity(name: str) -> Patches:
 
 @cache
 def coloured_walk(device: Device, name: str) -> list[list[np.ndarray]]:
-    return walked(device, COLOURED[name], (1024, 512, 256), shifts=SHIFTS)
+    return walked(device, COLOURED[name], (4096, 2048, 1024), shifts=SHIFTS)
 
 
 @pytest.mark.parametrize("bounce", [1, 2, 3])
@@ -150,8 +152,9 @@ def test_flux_of_each_bounce_is_that_of_radiosity(device: Device, name: str, bou
 @pytest.mark.parametrize("bounce", [2, 3])
 @pytest.mark.parametrize("name", COLOURED)
 def test_light_of_each_bounce_comes_from_where_radiosity_says(device: Device, name: str, bounce: int) -> None:
-    """What it brings to 40 points of the walls if nothing stood in the way, on average over the shifts."""
-    points, normals, _ = wall_points(40, seed=3, margin=0.6)
+    """What it brings to points away from the block if nothing stood in the way, on average over the shifts."""
+    points, normals, wall = wall_points(60, seed=3, margin=0.6)
+    points, normals = points[wall != FLOOR_WALL], normals[wall != FLOOR_WALL]
     patches = radiosity(name)
     flux = patches.reflectances * patches.irradiance[bounce - 1] * patches.areas[:, None]
     sent = VirtualPointLights(patches.middles, patches.normals, flux, np.zeros(len(flux)))
@@ -172,6 +175,15 @@ def test_fewer_lights_that_go_on_stand_for_all(device: Device) -> None:
         sums.append(np.mean([records["flux"].sum(axis=0) for _, records in found], axis=0))
     np.testing.assert_allclose(sums[0], sums[2], rtol=0.03)
     np.testing.assert_allclose(sums[1], sums[2], rtol=0.015)
+
+
+def test_even_a_few_lights_are_right_in_the_mean_over_shifts(device: Device) -> None:
+    """Four of each bounce, 1,500 times over, beside 60,000: places and directions have to be independent."""
+    shifts = [tuple(shift) for shift in np.random.default_rng(0).random((1500, 2)).tolist()]
+    few = walked(device, COLOURED["block"], (4, 4), shifts=shifts)
+    ((_, many),) = walked(device, COLOURED["block"], (60_000, 60_000))
+    found = np.mean([records["flux"].sum(axis=0) for _, records in few], axis=0)
+    np.testing.assert_allclose(found, many["flux"].sum(axis=0), rtol=0.01)
 
 
 TILTED = replace(FLOOR, corner_normals=np.broadcast_to(np.array([0.8, 0.0, 0.6], np.float32), (2, 3, 3)).copy())

@@ -20,6 +20,9 @@ from .vpl_placement import share_out
 WALK_BASES = ((2, 3), (5, 7), (11, 13))
 """Of Halton's sequence: of the places of lights in the maps, then of the directions in which each bounce goes on."""
 
+SHIFT_FACTORS = (1, 1009, 1_000_003)
+"""Primes by which the shifts of bounces differ."""
+
 
 @dataclass(frozen=True)
 class SurfaceMeans:
@@ -52,3 +55,13 @@ def bounce_counts(count: int, bounces: int, reflectance: float, block: int) -> t
     weights = min(max(reflectance, 0.0), 1.0) ** np.arange(bounces, dtype=np.float64)
     blocks = max(-(-count // block), int((weights > 0.0).sum()))
     return tuple(block * number for number in share_out(blocks, weights))
+
+
+def bounce_shift(shift: tuple[float, float], number: int) -> tuple[float, float]:
+    """The shift of a bounce's own points, in [0, 1), of that of the first bounce (number 1).
+
+    As even as `shift` over many of those, and independent of it to a thousandth: with one shift for all, where a light
+    lies and where it sends its light would move together, and the mean over shifts would be off.
+    """
+    x, y = (coordinate * SHIFT_FACTORS[number - 1] % 1.0 for coordinate in shift)
+    return x, y

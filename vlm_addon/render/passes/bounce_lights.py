@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...core.light_walk import WALK_BASES
+from ...core.light_walk import WALK_BASES, bounce_shift
 from ..gpu_layout import VIRTUAL_POINT_LIGHT
 from ..local_space import LocalSpace
 from ..scene_octree import SceneOctree
@@ -47,7 +47,7 @@ class BounceLightPass:
         """`count` lights in units of `space`: the next bounce of the first `count` of `lights`, which stand for all.
 
         lights: of the bounce before, in `space`, at least `count`. number: of the bounce that is made, 2 or 3. first,
-        shift: of the points in Halton's sequence, in bases of the bounce's own; `first` as for the first bounce.
+        shift: as for the first bounce, `first` below 13^8 - count; each bounce has bases and a shift of its own.
         surface_area: m² of all surfaces, over which the lights are taken to be spread.
         """
         size = VIRTUAL_POINT_LIGHT.dtype.itemsize
@@ -57,9 +57,9 @@ class BounceLightPass:
         lights.buffer.bind_to_storage_buffer(LIGHT_BINDING)
         found.buffer.bind_to_storage_buffer(NEXT_BINDING)
         octree.bind(OCTREE_BINDING, OCTREE_TRIANGLE_BINDING)
-        uniforms = {"count": count, "first_index": first, "bases": WALK_BASES[number - 1], "shift": shift}
+        uniforms = {"count": count, "first_index": first, "bases": WALK_BASES[number - 1]}
         uniforms |= {"gain": lights.count / count, "area": surface_area / count / space.unit**2}
-        uniforms |= {"octree_frame": octree.uniform(space)}
+        uniforms |= {"octree_frame": octree.uniform(space), "shift": bounce_shift(shift, number)}
         set_uniforms(self._shader, uniforms)
         self._shader.run(-(-count // GROUP_SIZE))
         self._context.memory_barrier()
