@@ -23,6 +23,7 @@ from vlm_addon.core.vpl import vpl_irradiance
 from vlm_addon.core.world_light import world_lights
 from vlm_addon.render.device import Device
 from vlm_addon.render.local_space import LocalSpace
+from vlm_addon.render.passes import rsm
 from vlm_addon.render.passes.flux_lights import FluxLightPass, parts_of_unit
 from vlm_addon.render.passes.rsm import LampReflections
 
@@ -228,6 +229,13 @@ def test_the_flux_of_maps_is_read_once_while_they_stay_as_they_are(device: Devic
             built.append(device.kept.built["map_fluxes"])
             np.testing.assert_allclose(found.mean(), maps.fluxes().powers.sum(), rtol=1e-5)
     assert [count - built[0] for count in built] == [0, 0, 1]
+
+
+def test_maps_that_are_not_kept_give_the_same_lights(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    (kept,) = placed(device, SCENES["four lamps"], 300)
+    monkeypatch.setattr(rsm, "CACHE_BYTES", 0)
+    (drawn,) = placed(device, SCENES["four lamps"], 300)
+    assert all((kept[field] == drawn[field]).all() for field in kept.dtype.names)
 
 
 def test_the_same_call_gives_the_same_bits(device: Device) -> None:

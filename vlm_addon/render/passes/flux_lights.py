@@ -50,10 +50,11 @@ class FluxLightPass:
             lights.buffer.clear()
             return lights
         ends = parts_of_unit(fluxes.powers)
-        lights.buffer.bind_to_storage_buffer(LIGHT_BINDING)
         set_uniforms(self._shader, {"count": count, "first_index": first, "shift": shift})
         for index, found in enumerate(maps.maps()):
             if ends[index] < ends[index + 1]:
+                # A map that is not kept is drawn on the way, with buffers of its own.
+                lights.buffer.bind_to_storage_buffer(LIGHT_BINDING)
                 part = float(ends[index]), float(ends[index + 1])
                 self._run(found, space, fluxes, index, part, count)
         self._context.memory_barrier()
