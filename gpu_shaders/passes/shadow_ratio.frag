@@ -8,9 +8,9 @@ layout(binding = UNSHADOWED_UNIT) uniform sampler2D unshadowed;
 layout(location = 0) out vec4 out_irradiance;   // W/m²
 layout(location = 1) out vec4 out_ratio;
 
-// 1 where nothing was asked for. Not a quotient where both are the same: a GPU's division may be off by a bit.
+// Not a quotient where both are the same: a GPU's division may be off by a bit. Filters may move either a little.
 float share(float seen, float asked, float otherwise) {
-    return asked > 0.0 ? (seen == asked ? 1.0 : seen / asked) : otherwise;
+    return asked > 0.0 ? (seen == asked ? 1.0 : clamp(seen / asked, 0.0, 1.0)) : otherwise;
 }
 
 void main() {

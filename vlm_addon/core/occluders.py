@@ -11,7 +11,7 @@ import numpy as np
 from .scene import Float64, Mesh
 
 MOST_PAIRS = 10_000_000
-"""Of a triangle and a point that are looked at, some tenths of a second; a scene with more counts as having occluders."""
+"""Of a triangle and a point that are looked at, some tenths of a second; scenes with more count as having occluders."""
 
 _AT_ONCE = 1_000_000
 _SLACK = 1e-6

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of the light of virtual lights gets to each pixel: a few rays through the octree, reused by the pixels around.
+"""How much of the light of virtual lights gets to each pixel: a few rays through the octree, used by the pixels around.
 
 A ratio estimator (Heitz, Hill and McGuire 2018): the sum over all lights stays as it is and is multiplied by the share
 of some picked light that gets there. Picks are in proportion to what each light gives to the pixel, spread over any
-4 x 4 pixels so that these together have 16 times as many, and both sides of the share are means over these pixels. Where
-all is visible the share is 1, so nothing of the sum is lost or made noisy.
+4 x 4 pixels so that these together have 16 times as many, and both sides of the share are means over these pixels.
+Where all is visible the share is 1, so nothing of the sum is lost or made noisy.
 """
 
 from __future__ import annotations
