@@ -67,13 +67,17 @@ def constant(size: tuple[int, int], value: float = 1.0) -> Float32:
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
-@pytest.mark.parametrize("scene", [box_room(), room_with_block()], ids=["room", "block"])
-def test_filter_is_its_definition(device: Device, scene: SceneSnapshot, n: int) -> None:
+@pytest.mark.parametrize(
+    "chosen",
+    [FilterSettings(), FilterSettings(filter_distance=0.013, filter_cosine=-1.0)],
+    ids=["as it comes", "planes alone"],
+)
+def test_filter_is_its_definition(device: Device, chosen: FilterSettings, n: int) -> None:
     values = random_values(SIZE)
     values[7, 9:12] = np.nan
-    run = Run(device, scene, values, n)
+    run = Run(device, room_with_block(), values, n, chosen)
     assert run.shown.mean() > 0.5
-    expected = filtered(run.surface, values, n, run.reach, FilterSettings().filter_cosine)
+    expected = filtered(run.surface, values, n, run.reach, chosen.filter_cosine)
     np.testing.assert_allclose(run.image, expected, atol=1e-5)
 
 
@@ -150,11 +154,11 @@ def test_what_shows_no_surface_is_not_counted_and_counts_for_nobody(device: Devi
     scene = replace(wall(), meshes=(quad((-0.3, -0.3, 0), (0.6, 0, 0), (0, 0.6, 0)),))
     shown = Run(device, scene, constant(SIZE)).shown
     assert 0.1 < shown.mean() < 0.9
-    values = np.where(shown[..., None], constant(SIZE), np.float32(np.nan))
-    run = Run(device, scene, values)
-    assert run.counters["unusable_pixels"] == 0.0
-    assert (run.image == values.astype(np.float32))[shown].all()
-    assert not run.image[~shown].any()
+    for around in (np.float32(np.nan), np.float32(5.0)):
+        run = Run(device, scene, np.where(shown[..., None], constant(SIZE), around), 4, EVERYTHING)
+        assert run.counters["unusable_pixels"] == 0.0
+        assert (run.image[shown] == 1.0).all()
+        assert not run.image[~shown].any()
 
 
 def stepped(run: Run, is_one_side: np.ndarray) -> Float32:
@@ -201,10 +205,13 @@ def test_who_counts_for_whom_is_symmetric(device: Device) -> None:
 
 
 def test_nothing_negative_is_made_and_what_is_negative_is_kept(device: Device) -> None:
-    values = random_values(SIZE)
-    assert (Run(device, room_with_block(), values).image >= 0.0).all()
-    run = Run(device, room_with_block(), -values)
-    assert run.image.min() < -0.3
+    """Values that grow with the square of the distance from the border: moved there along a slope, their mean falls
+    below them all."""
+    values = constant(SIZE) * np.arange(SIZE[0], dtype=np.float32)[None, :, None] ** 2
+    image = Run(device, wall(), values).image
+    assert (image >= 0.0).all()
+    assert (image[:, 0] == 0.0).all()
+    assert Run(device, wall(), -values).image.min() < -1000.0
 
 
 def test_the_filter_can_be_off(device: Device) -> None:
