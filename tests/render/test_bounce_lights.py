@@ -8,12 +8,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 
 from tests.render.closed_rooms import ROOM_REFLECTANCES, ROOM_SIZE, empty_room, inward_box, room_area, wall_points
 from tests.render.flux_lights import as_lights, walked
 from tests.render.rooms import quad
 from vlm_addon.core.lamps import lamp_irradiance
-from vlm_addon.core.scene import DIFFUSE, POINT, SUN, Float64, Light, Material, SceneSnapshot
+from vlm_addon.core.scene import DIFFUSE, POINT, SUN, Float64, Light, Material, Mesh, SceneSnapshot
 from vlm_addon.core.vpl import VirtualPointLights, vpl_irradiance
 from vlm_addon.render.device import Device
 from vlm_addon.render.local_space import LocalSpace
@@ -49,6 +50,34 @@ def test_each_bounce_in_a_closed_room_carries_what_the_one_before_reflects(devic
     for bounce, records in enumerate(found, 1):
         np.testing.assert_allclose(records["flux"].sum(axis=0), GREY**bounce * LAMP.power, rtol=0.005)
         assert (records["flux"].max(axis=1) > 0.0).all()
+
+
+def closed_sphere() -> SceneSnapshot:
+    """1,280 flat triangles that face the middle, and a lamp beside it."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.7)
+    triangles = ball.faces[:, ::-1].astype(np.int32)
+    count = len(triangles)
+    normals = -ball.face_normals.astype(np.float32)
+    mesh = Mesh(
+        name="sphere",
+        positions=np.array(ball.vertices, np.float64),
+        triangles=np.ascontiguousarray(triangles),
+        corner_normals=np.ascontiguousarray(np.repeat(normals[:, None], 3, axis=1)),
+        corner_uvs=np.zeros((count, 3, 2), np.float32),
+        corner_colors=np.zeros((0, 3, 3), np.float32),
+        material_indices=np.zeros(count, np.int32),
+        tag_ids=np.zeros(count, np.int32),
+        reflectance=np.zeros((count, 3), np.float32),
+        emission=np.zeros((count, 3), np.float32),
+    )
+    return SceneSnapshot("sphere", (mesh,), (Material("grey", DIFFUSE, tuple(GREY)),), lights=(LAMP,))
+
+
+def test_nothing_is_lost_between_the_triangles_of_a_sphere(device: Device) -> None:
+    (found,) = walked(device, closed_sphere(), (4000, 4000, 4000))
+    for bounce, records in enumerate(found, 1):
+        np.testing.assert_allclose(records["flux"].sum(axis=0), GREY**bounce * LAMP.power, rtol=0.005)
+    assert min(int((records["flux"].max(axis=1) > 0.0).sum()) for records in found) >= 3999
 
 
 @pytest.mark.parametrize("number", [2, 3])
