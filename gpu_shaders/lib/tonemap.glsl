@@ -9,10 +9,9 @@ float rec709_luminance(vec3 color) {
 }
 
 // Display luminance in [0, 1] of a luminance whose middle is a key of about 0.18: rises all the way, and reaches 1 at
-// `white` (Reinhard et al. 2002, eq. 4).
+// `white`, above which it stays (Reinhard et al. 2002, eq. 4).
 float photographic_curve(float luminance, float white) {
-    float x = min(luminance, white);
-    return min(x * (1.0 + x / (white * white)) / (1.0 + x), 1.0);
+    return min(luminance * (1.0 + luminance / (white * white)) / (1.0 + luminance), 1.0);
 }
 
 // The colour of the same luminance in [0, 1], mixed with as little grey as brings it within 1.

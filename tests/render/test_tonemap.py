@@ -92,8 +92,23 @@ def oracle(picture: np.ndarray) -> Float64:
 
 @pytest.mark.parametrize("size", [(96, 64), (61, 90), (200, 7), (16, 16)])
 def test_operator_is_its_definition(device: Device, size: tuple[int, int]) -> None:
+    """Also with a negative channel where another is too bright for the display."""
     picture = random_picture(size)
+    picture[3, 5] = (-0.3, 0.01, 5.0)
     np.testing.assert_allclose(shown(device, picture)[..., :3], oracle(picture), atol=2e-4)
+
+
+def test_a_pixel_of_absurd_brightness_hardly_moves_its_surroundings(device: Device) -> None:
+    """Its logarithm is cut before it enters any base: at 2^90 as at 2^30. Both move the mean, which is made up for."""
+    picture = np.ones((40, 48, 3), np.float32)
+    found = []
+    for stops in (30.0, 90.0):
+        picture[20, 24] = 2.0**stops
+        image = shown(device, picture)[..., 0].astype(float)
+        image[20, 24] = image[19, 24]
+        found.append(image / image[0, 0])
+        np.testing.assert_allclose(shown(device, picture)[..., :3], oracle(picture), atol=2e-4)
+    assert abs(found[0] - found[1]).max() < 0.02
 
 
 @pytest.mark.parametrize("level", [1e-6, 0.02, 1.0, 3e7])
