@@ -28,21 +28,21 @@ float baked_facing(uint entry, vec3 normal) {
 // A row and its weight in [0, 1] in one word; 0 for a weight too small.
 uint packed_baked_row(uint row, float weight) {
     uint steps = uint(weight * float(BAKED_WEIGHT_STEPS) + 0.5);
-    return steps == 0u ? 0u : row * (BAKED_WEIGHT_STEPS + 1u) + steps;
+    return steps == 0u ? 0u : row << BAKED_WEIGHT_BITS | steps;
 }
 
-uint row_of_packed(uint word) {
-    return word / (BAKED_WEIGHT_STEPS + 1u);
+uvec4 rows_of_packed(uvec4 words) {
+    return words >> BAKED_WEIGHT_BITS;
 }
 
 // In steps, exact.
-float weight_of_packed(uint word) {
-    return float(word % (BAKED_WEIGHT_STEPS + 1u));
+vec4 weights_of_packed(uvec4 words) {
+    return vec4(words & BAKED_WEIGHT_STEPS);
 }
 
-// The byte of a word that belongs to a light, 0 to 255.
-float byte_of_word(uint word, uint light) {
-    return float(word >> 8u * (light & 3u) & 255u);
+// The bytes of words that belong to a light, 0 to 255.
+vec4 bytes_of_words(uvec4 words, uint light) {
+    return vec4(words >> 8u * (light & 3u) & 255u);
 }
 
 // Whether points of two surfaces are over each other's planes. way: from the first to the second, in voxels, which float32

@@ -48,7 +48,7 @@ int zone_at(vec3 place) {
         return cell.x;
     }
     int at = cell.y * (CELL_SIDE * CELL_SIDE * CELL_SIDE) + number_of(voxel % CELL_SIDE, CELL_SIDE);
-    int label = int(byte_of_word(labels[at / 4], uint(at)));
+    int label = int(bytes_of_words(uvec4(labels[at / 4]), uint(at)).x);
     return label == 0 ? -1 : cell.x + label - 1;
 }
 

@@ -36,13 +36,12 @@ float baked_share(int k, uint light) {
         if (words.x == 0u) {
             break;
         }
-        for (int i = 0; i < 4; ++i) {
-            uint word = baked_shares[row_of_packed(words[i]) * words_per_row + light / 4u];
-            float weight = weight_of_packed(words[i]), share = byte_of_word(word, light);
-            weight = share == float(BAKED_UNFACED) ? 0.0 : weight;
-            total += weight;
-            sum += weight * share;
-        }
+        uvec4 at = rows_of_packed(words) * words_per_row + light / 4u;
+        uvec4 found = uvec4(baked_shares[at.x], baked_shares[at.y], baked_shares[at.z], baked_shares[at.w]);
+        vec4 shares = bytes_of_words(found, light);
+        vec4 weights = mix(weights_of_packed(words), vec4(0.0), equal(shares, vec4(BAKED_UNFACED)));
+        total += dot(weights, vec4(1.0));
+        sum += dot(weights, shares);
     }
     bool has_rows = baked_rows[BAKED_GROUPS * k].x != 0u;
     return total > 0.0 ? sum / (float(BAKED_FULL) * total) : (has_rows ? 0.0 : 1.0);

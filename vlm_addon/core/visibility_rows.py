@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,12 @@ from .morton import morton_codes
 from .octree_march import reaches
 from .sampling import square_to_triangle, unit_square_points
 from .scene import Float64, Int32, SceneSnapshot
-from .visibility_cells import Int64, VisibilityCells
+from .visibility_cells import Bools, Int64, VisibilityCells
 from .voxel_frame import VoxelFrame
 
+IsOpen = Callable[[Float64, Float64], Bools]
+"""Of (n, 3) surface points in voxel coordinates and their unit normals, (n,) whether no surface is between each and its
+lifted place."""
 WAYS = 6
 """2 axis + 1 for the negative one: which way a surface faces most."""
 # Samples from which a row's points are chosen, for each square voxel of surface.
@@ -36,18 +39,19 @@ class VisibilityRows:
 
 
 def make_rows(
-    snapshot: SceneSnapshot, frame: VoxelFrame, cells: VisibilityCells, points_per_row: int
+    snapshot: SceneSnapshot, frame: VoxelFrame, cells: VisibilityCells, points_per_row: int, is_open: IsOpen
 ) -> VisibilityRows:
     """A row for each zone and way in which samples of the visible surface lie, both sides of it; the same on every run.
 
     The points of a row are spread evenly over the area of its samples. Samples whose zone is not known, because
-    something else fills the voxel over them, belong to none.
+    something else fills the voxel over them, or is not reached from them belong to none.
     """
     places, normals, areas = _samples(opaque_corners(snapshot, frame))
     places, normals = np.concatenate([places, places]), np.concatenate([normals, -normals])
     areas = np.concatenate([areas, areas])
     zones = cells.zones_at(lifted_places(places, normals))
     known = np.flatnonzero(zones >= 0)
+    known = known[is_open(places[known], normals[known])]
     keys = zones[known] * WAYS + ways_of(normals[known])
     order = np.lexsort([morton_codes(places[known]), keys])
     known, keys = known[order], keys[order]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,8 +60,9 @@ def scene_visibility(
 
     def bake() -> GpuBakedVisibility:
         limit = min(MOST_BYTES, int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]))
-        octree, air, rows = _fitting_rows(context, shaders, kept, world, len(light_mesh), cells, points, limit)
-        shares = BakeVisibilityPass(context, shaders).bake(rows, light_mesh.samples, octree, progress)
+        render = BakeVisibilityPass(context, shaders)
+        octree, air, rows = _fitting_rows(context, shaders, kept, world, render, len(light_mesh), cells, points, limit)
+        shares = render.bake(rows, light_mesh.samples, octree, progress)
         baked = make_baked(octree.frame, air, rows, shares, key)
         return GpuBakedVisibility(context, baked, len(rows) * len(light_mesh) * points)
 
@@ -72,6 +74,7 @@ def _fitting_rows(
     shaders: ShaderLibrary,
     kept: Kept,
     world: SceneSnapshot,
+    render: BakeVisibilityPass,
     light_count: int,
     cells: int,
     points: int,
@@ -84,7 +87,7 @@ def _fitting_rows(
         octree = scene_octree(context, shaders, kept, world, number * SIDE)
         voxels = np.concatenate([np.zeros((0, 3), np.int64), *(tree.read().voxels() for tree in octree.trees)])
         air = make_cells(voxels, octree.frame.resolution)
-        rows = make_rows(world, octree.frame, air, points)
+        rows = make_rows(world, octree.frame, air, points, partial(render.are_open, octree=octree))
         needed = stored_bytes(len(rows), light_count)
         if needed <= limit and len(rows) <= MOST_ROWS:
             return octree, air, rows

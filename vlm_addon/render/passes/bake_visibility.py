@@ -17,13 +17,14 @@ from ...core.baked_visibility import (
     UInt8,
     words_of,
 )
-from ...core.brick_triangles import ALL_EXACT
 from ...core.errors import DeviceError
 from ...core.light_mesh import SourceSamples
 from ...core.progress import Progress, step
 from ...core.scene import Float64
+from ...core.visibility_cells import Bools
 from ...core.visibility_rows import VisibilityRows
 from ..buffer_pool import BufferPool
+from ..octree_settings import OctreeSettings
 from ..prefix_sum import INVOCATIONS, run_for_each
 from ..scene_octree import SceneOctree
 from ..shader_library import ShaderLibrary, set_uniforms
@@ -33,8 +34,11 @@ if TYPE_CHECKING:
 
 # Some seconds on two cores without a GPU, so that a cancellation is heard; some milliseconds with one.
 RAYS_PER_DISPATCH = 1 << 20
+EXACT_REACH = OctreeSettings().exact_reach
+"""Voxels near the ends of ways where triangles are asked, unless told: as without a bake."""
 BAKED_DEFINES: dict[str, int | float | bool | str] = {
     "BAKED_WEIGHT_STEPS": f"{WEIGHT_STEPS}u",
+    "BAKED_WEIGHT_BITS": f"{WEIGHT_STEPS.bit_length()}u",
     "BAKED_FULL": f"{FULL}u",
     "BAKED_UNFACED": f"{UNFACED}u",
     "BAKED_GRAZING": GRAZING,
@@ -53,15 +57,39 @@ _BINDINGS = {
 }
 
 
+_OPEN_BINDINGS = {
+    name: binding
+    for binding, name in enumerate(
+        ("PLACE_BINDING", "NORMAL_BINDING", "OPEN_BINDING", "OCTREE_BINDING", "OCTREE_TRIANGLE_BINDING")
+    )
+}
+
+
 class BakeVisibilityPass:
     """Casts the rays; everything in the voxel coordinates of one octree."""
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, exact_reach: int = ALL_EXACT) -> None:
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, exact_reach: int = EXACT_REACH) -> None:
         """exact_reach: as in lib/octree_triangles.glsl."""
         self._context = context
         self._pool = BufferPool(context)
         defines = {**_BINDINGS, **BAKED_DEFINES, "GROUP_SIZE": INVOCATIONS, "EXACT_REACH": exact_reach}
         self._shader = shaders.compute("passes/bake_visibility.comp", defines)
+        self._open = shaders.compute("passes/bake_open.comp", {**_OPEN_BINDINGS, "GROUP_SIZE": INVOCATIONS})
+
+    def are_open(self, places: Float64, normals: Float64, octree: SceneOctree) -> Bools:
+        """core.visibility_rows.IsOpen, of the triangles of `octree`."""
+        count, padding = len(places), ((0, 0), (0, 1))
+        with (
+            self._pool.uploaded(np.pad(places, padding).astype(np.float32)) as place_buffer,
+            self._pool.uploaded(np.pad(normals, padding).astype(np.float32)) as normal_buffer,
+            self._pool.take(4 * count) as opens,
+        ):
+            for binding, buffer in enumerate((place_buffer, normal_buffer, opens)):
+                buffer.bind_to_storage_buffer(binding)
+            octree.bind(_OPEN_BINDINGS["OCTREE_BINDING"], _OPEN_BINDINGS["OCTREE_TRIANGLE_BINDING"])
+            set_uniforms(self._open, {"count": count})
+            run_for_each(self._context, self._open, count)
+            return np.frombuffer(opens.read(4 * count), np.uint32) != 0
 
     def bake(self, rows: VisibilityRows, samples: SourceSamples, octree: SceneOctree, progress: Progress) -> UInt8:
         """(rows, lights) uint8, FULL where all of a light is seen. samples: of the lights, in the octree's space.
