@@ -39,7 +39,7 @@ void main() {
     vec4 sum = vec4(0.0);
     for (uint i = start + first; i < start + end; ++i) {
         VirtualPointLight light = lights[i];
-        vec3 brought = gain * bounded_geometry(p, n, light.position, light.normal, light.area).x * light.flux;
+        vec3 brought = gain * piece_geometry(p, n, light.position, light.normal, light.area) * light.flux;
         vec3 towards = light.position - p;
         bool faces = dot(towards, facet) > 0.0 && dot(towards, light.geometric_normal) < 0.0;
         if (!faces || dot(brought, vec3(1.0 / 3.0)) <= least) {

@@ -9,14 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...core.array_codec import content_hash
 from ...core.halton import halton_points
-from ...core.light_tree_bounds import triangle_areas
+from ...core.light_walk import SurfaceMeans, bounce_counts, surface_means
 from ...core.progress import Progress, step
 from ...core.scene import Float32
 from ...core.settings import OWN, setting
+from ..light_marks import marked_lights
 from ..map_settings import MapSettings, map_images
 from ..octree_settings import OctreeSettings
+from ..octree_view import octree_images
 from ..passes.accumulate import read_image
+from ..passes.bounce_lights import BounceLightPass
 from ..passes.filter import FilterSettings, GeometryFilterPass
 from ..passes.flux_lights import FluxLightPass
 from ..passes.interleave import MergePass, SplitPass
@@ -138,12 +142,13 @@ class ManyLightPass:
 class ManyLight(Technique):
     """Up to three diffuse bounces from point lights on what the lamps light, each hidden by what stands between.
 
-    Known bias: away from the ends of a way, whatever comes within a voxel of it is in the way, so shadows are wider by
-    up to a voxel, and transparent surfaces cast them whole. The bounded geometry term darkens corners, the less the
-    more lights. Lights that bring too little are left out (least_share). With interleaving, what few lights miss shows
-    as grain that the filter smooths, and small things that its thresholds take for their surroundings are smoothed
-    with them. Light of glowing surfaces does not bounce, surfaces reflect on their counter-clockwise side only, and a
-    lamp that casts no shadow still bounces off the nearest surface alone.
+    Known bias: each light spreads over a square of the surface that it stands for, so bright corners are softer than
+    they are, the less the more lights. With an exact_reach below octree_resolution, what comes within a voxel of a way
+    stops it: shadows are wider by up to that. Transparent surfaces cast them whole. Lights that bring too little are
+    left out (least_share). With interleaving, what few lights miss shows as grain that the filter smooths, and small
+    things that its thresholds take for their surroundings are smoothed with them. Light of glowing surfaces does not
+    bounce, surfaces reflect on their counter-clockwise side only, and a lamp that casts no shadow still bounces off the
+    nearest surface alone. Lights of later bounces know a triangle's mean colour and its own normal.
     """
 
     name = "many_light"
@@ -163,6 +168,8 @@ class ManyLight(Technique):
             self._maps.draw()
         width, height = scene.settings.width, scene.settings.height
         self._place = FluxLightPass(context, shaders)
+        self._bounce = BounceLightPass(context, shaders)
+        self._means = self._surface_means()
         self._split = SplitPass(context, shaders, width, height, settings.interleave)
         self._gather = ManyLightPass(context, shaders, *self._split.size)
         self._merge = MergePass(context, shaders, width, height, settings.interleave)
@@ -188,9 +195,16 @@ class ManyLight(Technique):
 
     def _placed(self, picture: int) -> list[PointLights]:
         """The lights of one picture of the frame, each bounce apart; every picture has others."""
-        count = _whole_runs(self.chosen.lights, self.chosen.interleave**2)
-        first = 1 + picture * count
-        return [self._place.render(self._maps, self.scene.space, count, first, self._shift)]
+        chosen, space = self.chosen, self.scene.space
+        means = self._means
+        reflectance = float(means.reflectance.mean())
+        counts = bounce_counts(chosen.lights, chosen.bounces, reflectance, chosen.interleave**2)
+        first = 1 + picture * counts[0]
+        lights = [self._place.render(self._maps, space, counts[0], first, self._shift)]
+        for number, count in enumerate(counts[1:], 2):
+            walked = self._bounce.render(lights[-1], self._octree, space, count, number, first, self._shift, means.area)
+            lights.append(walked)
+        return lights
 
     def _gathered(self, frame: FrameInputs, is_occluded: bool) -> moderngl.Texture:
         """What each pixel of the split picture receives."""
@@ -208,9 +222,15 @@ class ManyLight(Technique):
 
     def _mean_irradiance(self) -> float:
         """W/m², mean of the channels, of one bounce if none of it leaves the scene."""
-        meshes = self.scene.world.meshes
-        area = sum(float(triangle_areas(mesh.positions[mesh.triangles]).sum()) for mesh in meshes)
+        area = self._means.area
         return float(self._maps.fluxes().powers.sum()) / area if area > 0.0 else 0.0
+
+    def _surface_means(self) -> SurfaceMeans:
+        """Of all surfaces, kept while they stay as they are."""
+        meshes = self.scene.world.meshes
+        key = content_hash([[mesh.positions, mesh.triangles, mesh.reflectance] for mesh in meshes])
+        means: SurfaceMeans = self.scene.kept.get("surface_means", key, lambda: surface_means(meshes))
+        return means
 
     def counters(self) -> dict[str, float]:
         """Of the last picture: lights; ways asked for at a pixel, and the share of its lights for which none was, as
@@ -226,7 +246,7 @@ class ManyLight(Technique):
 
     def images(self) -> dict[str, Float32]:
         """Of the last picture: what the gather saw and found, split; merged, before the filter; the share of the light
-        that nothing stops; and what the first maps show."""
+        that nothing stops; lights; levels of the octree; and what the first maps show."""
         frame = self._frame
         if frame is None:
             return {}
@@ -240,6 +260,8 @@ class ManyLight(Technique):
         unhindered = read_image(self._merge.render(self._gathered(frame, is_occluded=False)))[..., :3]
         found |= {"split_irradiance": seen, "merged_irradiance": merged}
         found["visibility"] = np.divide(merged, unhindered, out=np.ones_like(merged), where=unhindered > 0.0)
+        found["lights"] = marked_lights(frame.gbuffer, frame.view, self._lights)
+        found |= octree_images(self._octree, frame.view, frame.gbuffer, self.scene.space)
         found |= map_images(self._maps)
         return {f"{self.name}_{name}": np.ascontiguousarray(image, np.float32) for name, image in found.items()}
 
@@ -247,11 +269,6 @@ class ManyLight(Technique):
         """Which lamps' light does not bounce as they shine."""
         names = [light.name for light in self.scene.snapshot.lights if not light.casts_shadow]
         return [f"{', '.join(names)}: no shadow, yet the light bounces off the nearest surfaces only"] if names else []
-
-
-def _whole_runs(count: int, tiles: int) -> int:
-    """The least multiple of `tiles` from `count` on."""
-    return -(-count // tiles) * tiles
 
 
 def _shift_of(seed: int) -> tuple[float, float]:
