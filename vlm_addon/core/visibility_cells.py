@@ -97,7 +97,7 @@ def make_cells(voxels: Int64, resolution: int) -> VisibilityCells:
     busy = np.flatnonzero(by_cell.any(axis=(1, 2, 3)))
     labels = _labels(~by_cell[busy])
     counts = np.ones(per_axis**3, np.int64)
-    counts[busy] = labels.reshape(len(busy), -1).max(axis=1, initial=0)
+    counts[busy] = labels.reshape(len(busy), VOXELS).max(axis=1, initial=0)
     first_zone = np.concatenate([[0], np.cumsum(counts)])
     label_start = np.full(per_axis**3, UNKNOWN, np.int32)
     label_start[busy] = np.arange(len(busy))
@@ -124,16 +124,15 @@ def _labels(free: Bools) -> Int64:
         after = before.copy()
         for axis in (1, 2, 3):
             low, high = (slice(None),) * axis + (slice(0, -1),), (slice(None),) * axis + (slice(1, None),)
-            # A number goes on through the whole cell along an axis that is free.
-            for _ in range(2):
-                np.maximum(after[low], after[high], out=after[low], where=free[going][low])
-                np.maximum(after[high], after[low], out=after[high], where=free[going][high])
+            np.maximum(after[low], after[high], out=after[low], where=free[going][low])
+            np.maximum(after[high], after[low], out=after[high], where=free[going][high])
         labels[going] = after
         going = going[(after != before).any(axis=(1, 2, 3))]
-    is_root = labels.reshape(len(free), -1) == own.reshape(1, -1)
+    flat = labels.reshape(len(free), VOXELS)
+    is_root = flat == own.reshape(1, VOXELS)
     rank = np.minimum(is_root.cumsum(axis=1), MOST_ZONES)
     padded = np.concatenate([np.zeros((len(free), 1), rank.dtype), rank], axis=1)
-    numbered = np.take_along_axis(padded, labels.reshape(len(free), -1).astype(np.int64), axis=1)
+    numbered = np.take_along_axis(padded, flat.astype(np.int64), axis=1)
     return np.asarray(numbered.reshape(free.shape), np.int64)
 
 
