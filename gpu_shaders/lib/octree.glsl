@@ -24,7 +24,7 @@ struct VoxelBox {
 };
 
 // A way through voxels. cell: where it is; last: where it ends; fraction: of the way, about where it came into `cell`;
-// steps: how many it may take yet.
+// steps: how many it may take yet; ended: whether nothing is left of it, which a walk that is cut off never says.
 struct OctreeWalk {
     vec3 start;
     vec3 along;
@@ -32,6 +32,7 @@ struct OctreeWalk {
     ivec3 last;
     float fraction;
     int steps;
+    bool ended;
 };
 
 // Voxel coordinates of a position. frame: the octree's lower corner, and voxels for each unit of length.
@@ -87,16 +88,18 @@ VoxelBox octree_box(uint tree, ivec3 cell) {
 
 // From start to end, with as many steps as no walk exceeds.
 OctreeWalk octree_walk(vec3 start, vec3 end) {
-    return OctreeWalk(start, end - start, octree_cell(start), octree_cell(end), 0.0, 3 * (1 << octree_words[1]) + 8);
+    int most_steps = 3 * (1 << octree_words[1]) + 8;
+    return OctreeWalk(start, end - start, octree_cell(start), octree_cell(end), 0.0, most_steps, false);
 }
 
-// Moves a walk out of the cube of voxels from `low` to `high` that holds its cell, or returns false: it ends in there.
-bool octree_leave(inout OctreeWalk walk, ivec3 low, ivec3 high) {
+// Moves a walk out of the cube of voxels from `low` to `high` that holds its cell, unless it ends in there.
+void octree_leave(inout OctreeWalk walk, ivec3 low, ivec3 high) {
     ivec3 way = sign(walk.last - walk.cell), ahead = max(way, 0);
     ivec3 far = ahead * high + (1 - ahead) * low;
     bvec3 leaves = greaterThan((walk.last - far) * way, ivec3(0));
     if (!any(leaves)) {
-        return false;
+        walk.ended = true;
+        return;
     }
     vec3 fractions = mix(vec3(2.0), (vec3(far + ahead) - walk.start) / walk.along, leaves);
     float least = min(fractions.x, min(fractions.y, fractions.z));
@@ -109,14 +112,14 @@ bool octree_leave(inout OctreeWalk walk, ivec3 low, ivec3 high) {
     walk.cell = next;
     walk.fraction = least;
     --walk.steps;
-    return true;
 }
 
 // Moves a walk to the next occupied voxel of a tree, its own included, and returns its box; or a box that is not occupied
 // where there is none up to its end.
 VoxelBox octree_next(uint tree, inout OctreeWalk walk) {
     VoxelBox box = octree_box(tree, walk.cell);
-    while (!box.occupied && walk.steps > 0 && octree_leave(walk, box.low, box.high)) {
+    while (!box.occupied && !walk.ended && walk.steps > 0) {
+        octree_leave(walk, box.low, box.high);
         box = octree_box(tree, walk.cell);
     }
     return box;
@@ -125,7 +128,7 @@ VoxelBox octree_next(uint tree, inout OctreeWalk walk) {
 // Whether one tree has no occupied voxel between two points in voxel coordinates, the points' own voxels included.
 bool octree_tree_clear(uint tree, vec3 start, vec3 end) {
     OctreeWalk walk = octree_walk(start, end);
-    return !octree_next(tree, walk).occupied && walk.steps > 0;
+    return !octree_next(tree, walk).occupied && walk.ended;
 }
 
 // Whether no tree has an occupied voxel between two points in voxel coordinates, the points' own voxels included.

@@ -135,7 +135,8 @@ uvec2 octree_list(uint tree, uint brick, ivec3 cell) {
 
 // Whether a way meets a triangle of a list. asked: the triangle that was asked last, often that of the next voxel too.
 bool octree_list_blocks(uint tree, uvec2 list, OctreeRay ray, float slack, inout uint asked) {
-    for (uint i = list.x; i < list.y; ++i) {
+    uint i = list.x;
+    for (; i < list.y; ++i) {
         uint triangle = octree_triangle_words[i];
         if (triangle != asked) {
             asked = triangle;
@@ -144,7 +145,8 @@ bool octree_list_blocks(uint tree, uvec2 list, OctreeRay ray, float slack, inout
             }
         }
     }
-    return false;
+    // Not all of them if the loop was cut off.
+    return i < list.y;
 }
 
 // Whether no triangle of one tree is on the way between two points.
@@ -153,15 +155,16 @@ bool octree_tree_open(uint tree, vec3 start, vec3 end) {
     OctreeRay ray = octree_ray(start, end);
     float slack = octree_edge_slack();
     uint asked = OCTREE_NO_TRIANGLE;
-    bool goes_on = true;
-    while (goes_on && walk.steps > 0) {
+    while (!walk.ended && walk.steps > 0) {
         VoxelBox box = octree_next(tree, walk);
-        if (box.occupied && octree_list_blocks(tree, octree_list(tree, box.brick, walk.cell), ray, slack, asked)) {
-            return false;
+        if (box.occupied) {
+            if (octree_list_blocks(tree, octree_list(tree, box.brick, walk.cell), ray, slack, asked)) {
+                return false;
+            }
+            octree_leave(walk, box.low, box.high);
         }
-        goes_on = box.occupied && octree_leave(walk, box.low, box.high);
     }
-    return !goes_on;
+    return walk.ended;
 }
 
 // Whether no triangle is on the way between two points in voxel coordinates.
@@ -221,13 +224,12 @@ OctreeCrossing octree_tree_nearest(uint tree, vec3 start, vec3 end, OctreeCrossi
     OctreeWalk walk = octree_walk(start, end);
     OctreeRay ray = octree_ray(start, end);
     float slack = octree_edge_slack();
-    bool goes_on = true;
-    while (goes_on && walk.steps > 0 && walk.fraction <= found.fraction) {
+    while (!walk.ended && walk.steps > 0 && walk.fraction <= found.fraction) {
         VoxelBox box = octree_next(tree, walk);
         if (box.occupied) {
             found = octree_list_nearest(tree, octree_list(tree, box.brick, walk.cell), ray, slack, found);
+            octree_leave(walk, box.low, box.high);
         }
-        goes_on = box.occupied && octree_leave(walk, box.low, box.high);
     }
     return found;
 }

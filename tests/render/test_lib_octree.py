@@ -108,8 +108,8 @@ LEAVE = """
 vec4 left_box(vec3 a, vec3 b) {
     OctreeWalk walk = octree_walk(a, b);
     VoxelBox box = octree_box(0u, walk.cell);
-    bool goes_on = octree_leave(walk, box.low, box.high);
-    return vec4(walk.cell, float(goes_on));
+    octree_leave(walk, box.low, box.high);
+    return vec4(walk.cell, float(!walk.ended));
 }
 vec4 next_box(vec3 a, vec3 b) {
     OctreeWalk walk = octree_walk(a, b);

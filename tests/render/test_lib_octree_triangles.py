@@ -365,6 +365,26 @@ def test_no_light_through_a_ball_in_a_million(device, depth):
     assert not any(leaks(device, depth, 1_000_000, (0, *REACHES))[0].values())
 
 
+BURNED = """
+// After so many rounds that a software renderer has cut off all loops.
+vec2 burned(vec3 a, vec3 b) {
+    float sum = 0.0;
+    for (int i = 0; i < 70000 && sum >= 0.0; ++i) {
+        sum += fract(a.x * float(i));
+    }
+    return vec2(octree_open(a, b) && sum >= 0.0, octree_clear(a, b) && sum >= 0.0);
+}
+"""
+
+
+def test_a_way_that_is_cut_off_counts_as_blocked(device, bound):
+    inputs = ways(512, 19)
+    blocked = np.isfinite(crossings(inputs["a"], inputs["b"], bound)[0])
+    found = ask_exact(device, "burned(a, b)", inputs, 2, BURNED)
+    assert not found[blocked].any()
+    assert blocked.any()
+
+
 def contact_pairs(count):
     """Points of a floor and of the sides and the top of a block on it, near the line where they meet and elsewhere."""
     rng = np.random.default_rng(16)
