@@ -96,11 +96,6 @@ class ManyLightPass:
             for occluded in (False, True)
         }
 
-    @property
-    def texture(self) -> moderngl.Texture:
-        """What `render` found last."""
-        return self._irradiance.texture
-
     def render(
         self,
         picked: PickedPixels,
@@ -255,10 +250,10 @@ class ManyLight(Technique):
             "split_position": self.scene.space.world_points(read_image(picked.gbuffer.position)[..., :3]),
             "split_normal": read_image(picked.gbuffer.geometric_normal)[..., :3],
         }
-        seen = read_image(self._gathered(frame, is_occluded=True))[..., :3]
-        merged = read_image(self._merge.render(self._gather.texture))[..., :3]
         unhindered = read_image(self._merge.render(self._gathered(frame, is_occluded=False)))[..., :3]
-        found |= {"split_irradiance": seen, "merged_irradiance": merged}
+        self._found = self._gathered(frame, is_occluded=True)
+        merged = read_image(self._merge.render(self._found))[..., :3]
+        found |= {"split_irradiance": read_image(self._found)[..., :3], "merged_irradiance": merged}
         found["visibility"] = np.divide(merged, unhindered, out=np.ones_like(merged), where=unhindered > 0.0)
         found["lights"] = marked_lights(frame.gbuffer, frame.view, self._lights)
         found |= octree_images(self._octree, frame.view, frame.gbuffer, self.scene.space)
