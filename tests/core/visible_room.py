@@ -95,7 +95,7 @@ def exact_shares(
     begins, ends = start + OFF_SURFACE * normal, end + OFF_SURFACE * end_normal
     hits = tree.first_hits(begins.reshape(-1, 3), ends.reshape(-1, 3)).reshape(facing.shape)
     seen = (np.isinf(hits) & facing).sum(axis=1)
-    return np.where(facing.any(axis=1), np.rint(FULL * seen / np.maximum(facing.sum(axis=1), 1)), UNFACED)
+    return np.where(facing.any(axis=1), np.floor(FULL * seen / np.maximum(facing.sum(axis=1), 1) + 0.5), UNFACED)
 
 
 def host_bake(snapshot: SceneSnapshot, lights: VirtualLightMesh, cells: int = 4, points: int = 4) -> BakedVisibility:

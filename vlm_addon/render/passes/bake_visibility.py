@@ -79,6 +79,8 @@ class BakeVisibilityPass:
     def are_open(self, places: Float64, normals: Float64, octree: SceneOctree) -> Bools:
         """core.visibility_rows.IsOpen, of the triangles of `octree`."""
         count, padding = len(places), ((0, 0), (0, 1))
+        if not count:
+            return np.zeros(0, bool)
         with (
             self._pool.uploaded(np.pad(places, padding).astype(np.float32)) as place_buffer,
             self._pool.uploaded(np.pad(normals, padding).astype(np.float32)) as normal_buffer,
