@@ -86,6 +86,8 @@ def _add_bake(commands: argparse._SubParsersAction[_Parser]) -> None:
         "the light grid as a file; with --range, OUT.npz holds the thesis's lists of one size for other programs"
     )
     command.add_argument("--light-grid", type=Path, metavar="OUT.vlmgrid", help=grid_help)
+    visibility_help = "bake what surfaces see of each light, too, into the light grid's file and the report"
+    command.add_argument("--visibility", action="store_true", help=visibility_help)
     command.add_argument("--save", type=Path, metavar="OUT.blend", help="the scene with its light mesh and settings")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="what was made, measured and found")
     command.set_defaults(run=_bake)

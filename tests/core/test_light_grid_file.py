@@ -19,7 +19,7 @@ from vlm_addon.core.array_codec import content_hash, flatten
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_grid import RANGE, GridSettings, LightGrid
 from vlm_addon.core.light_grid_error import grid_error
-from vlm_addon.core.light_grid_file import MAGIC, VERSION, load_light_grid, save_light_grid
+from vlm_addon.core.light_grid_file import MAGIC, VERSION, WITH_VISIBILITY, load_light_grid, save_light_grid
 from vlm_addon.core.surface_points import SurfacePoints
 
 HEADER = struct.Struct("<8sIQ32s")
@@ -265,8 +265,8 @@ def test_foreign_files_are_refused(tmp_path, data):
 
 
 def test_other_versions_say_so(whole, tmp_path):
-    newer = whole[:8] + (VERSION + 1).to_bytes(4, "little") + whole[12:]
-    assert f"version {VERSION + 1}" in refused(tmp_path / "newer.vlmgrid", newer)
+    newer = whole[:8] + (WITH_VISIBILITY + 1).to_bytes(4, "little") + whole[12:]
+    assert f"version {WITH_VISIBILITY + 1}" in refused(tmp_path / "newer.vlmgrid", newer)
 
 
 def test_missing_files_and_folders_are_refused(grid, tmp_path):

@@ -36,6 +36,7 @@ from .names import SOURCES_PROPERTY
 from .properties import ensure_scene_settings, technique_settings
 from .render_process import KEPT
 from .scene_file import OpenedScene, open_scene, require_writable, save_blend
+from .visibility_bake import bake_visibility, require_room_for_visibility
 from .write_back import write_light_mesh
 
 
@@ -47,6 +48,7 @@ def bake_command(arguments: Namespace) -> None:
         raise InvalidInput("bake", "nothing would be written", remedy)
     settings = _simplify_settings(arguments.triangles)
     _require_apart(arguments.scene, outputs)
+    require_room_for_visibility(arguments)
     opened, found = _open(arguments)
     keep_options(bpy.context.scene, arguments)
     drawn = _drawn_by_hand()
@@ -67,9 +69,12 @@ def bake_command(arguments: Namespace) -> None:
         )
     grid = _grid(found.snapshot, arguments)
     findings = (*findings, *(grid.findings if grid is not None else ()))
+    visibility = bake_visibility(found.snapshot, arguments.viewport_levels) if arguments.visibility else None
     if grid is not None and arguments.light_grid is not None:
-        write = save_fixed_size_lists if arguments.light_grid.suffix == FIXED_SIZE_SUFFIX else save_light_grid
-        write(grid.grid, arguments.light_grid)
+        if arguments.light_grid.suffix == FIXED_SIZE_SUFFIX:
+            save_fixed_size_lists(grid.grid, arguments.light_grid)
+        else:
+            save_light_grid(grid.grid, arguments.light_grid, visibility.baked if visibility is not None else None)
     if arguments.save is not None:
         save_blend(arguments.save, opened)
     _print_findings(findings)
@@ -77,6 +82,9 @@ def bake_command(arguments: Namespace) -> None:
     if grid is not None:
         print(grid.summary())
     about_grid = {"light_grid": grid.report() if grid is not None else None}
+    if visibility is not None:
+        print(visibility.summary())
+        about_grid["visibility"] = visibility.report()
     about_findings = {"findings": [str(finding) for finding in findings]}
     write_json(arguments.json, _scene_report(opened) | made.report() | about_grid | about_findings)
 

@@ -11,9 +11,12 @@ from ..core.errors import InvalidInput
 from ..core.light_grid import RANGE, TOLERANCE, GridSettings
 from ..core.settings import from_mapping
 from ..render.technique import technique_by_name
+from ..render.techniques.vlm import BAKED
 from .properties import technique_group, technique_settings
 
 TECHNIQUE = "vlm"
+VISIBILITY = "visibility"
+"""The technique's setting that says what stands in the way of light."""
 MODE = "lights"
 """The technique's setting that holds the grid's mode, or that there is none."""
 
@@ -36,6 +39,8 @@ def keep_options(scene: Any, arguments: Namespace) -> None:
     for mode in (TOLERANCE, RANGE):
         if mode in given:
             given[MODE] = mode
+    if arguments.visibility:
+        given[VISIBILITY] = BAKED
     values |= given
     for name in ("grid", "max_lights"):
         if name in given and values[MODE] != RANGE:

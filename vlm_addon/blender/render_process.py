@@ -5,15 +5,20 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from threading import Lock
+from typing import TypeVar
 
+from ..core.baked_visibility import BakedVisibility
 from ..core.errors import DeviceError, VlmError
 from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.scene import SceneSnapshot
 from ..render.client import RenderProcess
 from ..render.frame_types import Frame, RenderSettings
+
+T = TypeVar("T")
 
 CHILD_MODULES = ("numpy", "moderngl", "glcontext")
 
@@ -33,11 +38,22 @@ class KeptRenderProcess:
         progress: Progress,
     ) -> Frame:
         """One picture. Raises VlmError; after a DeviceError the next picture starts a new process."""
+        return self._with_process(lambda process: process.render(snapshot, light_mesh, settings, progress))
+
+    def bake_visibility(
+        self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, cells: int, points: int, progress: Progress
+    ) -> BakedVisibility:
+        """As Device.bake_visibility. Raises VlmError."""
+        return self._with_process(
+            lambda process: process.bake_visibility(snapshot, light_mesh, cells, points, progress)
+        )
+
+    def _with_process(self, work: Callable[[RenderProcess], T]) -> T:
         with self._lock:
             if self._process is None:
                 self._process = RenderProcess(_python(), search_paths())
             try:
-                return self._process.render(snapshot, light_mesh, settings, progress)
+                return work(self._process)
             except DeviceError:
                 self._close()
                 raise

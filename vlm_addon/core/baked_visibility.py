@@ -73,12 +73,15 @@ class RowLists:
 @dataclass(frozen=True)
 class BakedVisibility:
     """frame: of the voxels that cells are made of, in world space. shares: (rows, lights) uint8, each different row
-    once. made_of: hash of all that it depends on."""
+    once. points: of a row, from which it was baked. ways: between points that were looked at for it. made_of:
+    `bake_hash` of all that it depends on."""
 
     frame: VoxelFrame
     cells: VisibilityCells
     lists: RowLists
     shares: UInt8
+    points: int
+    ways: int
     made_of: str
 
     @property
@@ -91,6 +94,11 @@ class BakedVisibility:
     def cells_per_axis(self) -> int:
         """Along the longest axis of the scene."""
         return self.frame.resolution // SIDE
+
+    def require_made_of(self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh) -> None:
+        """Raises InvalidInput unless it was baked from what `snapshot` shows and from these very lights."""
+        if bake_hash(snapshot, light_mesh, self.cells_per_axis, self.points) != self.made_of:
+            raise InvalidInput("baked visibility", "it was baked from other surfaces or other lights", "bake it again")
 
     def at(self, positions: npt.ArrayLike, normals: npt.ArrayLike) -> Float64:
         """(p, lights) visibility in [0, 1] at points of the surface, world space; 1 where no row is near, 0 of lights
@@ -171,12 +179,15 @@ def make_baked(
     frame: VoxelFrame, cells: VisibilityCells, rows: VisibilityRows, shares: UInt8, made_of: str
 ) -> BakedVisibility:
     """shares: (r, lights) of each of the rows; equal ones are stored once."""
+    points = rows.places.shape[1]
     if shares.size:
         view = np.ascontiguousarray(shares).view(np.dtype((np.void, shares.shape[1]))).ravel()
         _, first, inverse = np.unique(view, return_index=True, return_inverse=True)
     else:
         first, inverse = np.arange(len(rows)), np.arange(len(rows))
-    return BakedVisibility(frame, cells, make_lists(cells, rows, inverse.reshape(-1)), shares[first], made_of)
+    return BakedVisibility(
+        frame, cells, make_lists(cells, rows, inverse.reshape(-1)), shares[first], points, shares.size * points, made_of
+    )
 
 
 def bake_hash(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, cells: int, points: int) -> str:

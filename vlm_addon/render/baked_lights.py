@@ -78,7 +78,7 @@ class BakedLights:
             "visibility_cells": baked.cells_per_axis,
             "visibility_rows": len(baked.shares),
             "visibility_mb": 1e-6 * baked.nbytes,
-            "visibility_ways": self._visibility.ways,
+            "visibility_ways": baked.ways,
             "visibility_pixels_between": unknown,
             "visibility_pixels_without": bare,
         }

@@ -14,16 +14,18 @@ import shutil
 import subprocess
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.array_codec import flatten, unflatten
+from ..core.baked_visibility import BakedVisibility
 from ..core.errors import Cancelled, DeviceError, InvalidInput, ShaderError, VlmError
+from ..core.light_grid_file import visibility_from_tree
 from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress, silent
 from ..core.scene import Finding, SceneSnapshot
@@ -40,6 +42,8 @@ SILENCE_LIMIT_S = 300.0
 # How often a waiting caller is asked whether to go on.
 POLL_S = 0.1
 SHUTDOWN_S = 3.0
+
+T = TypeVar("T")
 
 
 class RenderProcess:
@@ -98,13 +102,36 @@ class RenderProcess:
 
         Raises DeviceError where the child ends, hangs or sends what it should not; then this object is closed.
         """
+        return self._asked("render", snapshot, light_mesh, asdict(settings), progress, self._frame)
+
+    def bake_visibility(
+        self,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh,
+        cells: int,
+        points: int,
+        progress: Progress = silent,
+    ) -> BakedVisibility:
+        """What `Device.bake_visibility` of the child gives, with the same errors and those of `render`."""
+        settings = {"cells": cells, "points": points}
+        return self._asked("bake_visibility", snapshot, light_mesh, settings, progress, self._visibility)
+
+    def _asked(
+        self,
+        kind: str,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh | None,
+        settings: dict[str, Any],
+        progress: Progress,
+        answer: Callable[[Progress], T],
+    ) -> T:
         try:
             if not self._greeted:
                 self._greet(progress)
             self._number += 1
             self._remove_arrays()
-            self._send(snapshot, light_mesh, settings)
-            return self._answer(progress)
+            self._send(kind, snapshot, light_mesh, settings)
+            return answer(progress)
         except DeviceError:
             self.close()
             raise
@@ -153,16 +180,18 @@ class RenderProcess:
             raise DeviceError("the render process is of another version; restart Blender")
         self._greeted = True
 
-    def _send(self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings) -> None:
+    def _send(
+        self, kind: str, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: dict[str, Any]
+    ) -> None:
         scene, arrays = flatten({"snapshot": snapshot, "light_mesh": light_mesh})
         file = f"scene-{self._number}.bin"
         request = {
-            "type": "render",
+            "type": kind,
             "number": self._number,
             "scene": scene,
             "file": file,
             "arrays": store_arrays(self._folder / file, arrays),
-            "settings": asdict(settings),
+            "settings": settings,
         }
         self._write(request)
 
@@ -173,12 +202,19 @@ class RenderProcess:
         except OSError:
             raise self._ended() from None
 
-    def _answer(self, progress: Progress) -> Frame:
+    def _answer(self, kind: str, progress: Progress) -> Any:
+        """The tree of the child's answer."""
         answer = self._next(progress)
-        if answer.get("type") != "frame":
-            raise DeviceError(f"the render process answered {answer.get('type')!r} instead of a frame; render again")
-        images = [np.array(array) for array in map_arrays(self._folder / answer["file"], answer["arrays"])]
-        tree = unflatten(answer["frame"], images)
+        if answer.get("type") != kind:
+            raise DeviceError(f"the render process answered {answer.get('type')!r} instead of a {kind}; render again")
+        arrays = [np.array(array) for array in map_arrays(self._folder / answer["file"], answer["arrays"])]
+        return unflatten(answer[kind], arrays)
+
+    def _visibility(self, progress: Progress) -> BakedVisibility:
+        return visibility_from_tree(self._answer("visibility", progress))
+
+    def _frame(self, progress: Progress) -> Frame:
+        tree = self._answer("frame", progress)
         return Frame(
             images=tree["images"],
             timings=[(name, milliseconds) for name, milliseconds in tree["timings"]],

@@ -24,6 +24,8 @@ from .shader_library import ShaderLibrary
 if TYPE_CHECKING:
     import moderngl
 
+    from ..core.baked_visibility import BakedVisibility
+
 REQUIRED_VERSION = 430
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swr", "swiftshader", "software", "lavapipe", "gdi generic")
 FENCE, QUERY = "fence and wall clock", "timer queries"
@@ -98,6 +100,25 @@ class Device:
 
         with self.current():
             return render_frame(self, snapshot, light_mesh, settings, progress)
+
+    def bake_visibility(
+        self,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh,
+        cells: int,
+        points: int,
+        progress: Progress = silent,
+    ) -> BakedVisibility:
+        """What the surfaces of `snapshot` see of the lights: core.baked_visibility. cells: along the longest axis.
+        points: of a row, from which rays are cast.
+
+        Raises InvalidInput for another number of cells or where shares take too much memory, Cancelled when `progress`
+        says so, DeviceError when OpenGL fails.
+        """
+        from .scene_visibility import baked_visibility
+
+        with self.current() as context:
+            return baked_visibility(context, self.shaders, self.kept, snapshot, light_mesh, cells, points, progress)
 
     def timer(self) -> PassTimer:
         """A timer of passes that suits this device; valid until the next one is made."""

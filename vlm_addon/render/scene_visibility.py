@@ -50,23 +50,37 @@ def scene_visibility(
     points: int,
     progress: Progress,
 ) -> GpuBakedVisibility:
-    """What the surfaces of `world` see of `light_mesh`, both in world space; made where none of these is kept.
+    """`baked_visibility` on the device; made where none of these very surfaces, lights and numbers is kept."""
+
+    def bake() -> GpuBakedVisibility:
+        baked = baked_visibility(context, shaders, kept, world, light_mesh, cells, points, progress)
+        return GpuBakedVisibility(context, baked)
+
+    return kept.get(KIND, bake_hash(world, light_mesh, cells, points), bake)
+
+
+def baked_visibility(
+    context: moderngl.Context,
+    shaders: ShaderLibrary,
+    kept: Kept,
+    world: SceneSnapshot,
+    light_mesh: VirtualLightMesh,
+    cells: int,
+    points: int,
+    progress: Progress,
+) -> BakedVisibility:
+    """What the surfaces of `world` see of `light_mesh`, both in world space.
 
     cells: along the longest axis, fewer where so many take more than MOST_BYTES or the device's blocks hold. points: of
     a row. Raises InvalidInput where even the fewest cells take more, or for another number of cells; Cancelled when
     `progress` says so; DeviceError when OpenGL fails.
     """
-    key = bake_hash(world, light_mesh, cells, points)
-
-    def bake() -> GpuBakedVisibility:
-        limit = min(MOST_BYTES, int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]))
-        render = BakeVisibilityPass(context, shaders)
-        octree, air, rows = _fitting_rows(context, shaders, kept, world, render, len(light_mesh), cells, points, limit)
-        shares = render.bake(rows, light_mesh.samples, octree, progress)
-        baked = make_baked(octree.frame, air, rows, shares, key)
-        return GpuBakedVisibility(context, baked, len(rows) * len(light_mesh) * points)
-
-    return kept.get(KIND, key, bake)
+    limit = min(MOST_BYTES, int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]))
+    render = BakeVisibilityPass(context, shaders)
+    octree, air, rows = _fitting_rows(context, shaders, kept, world, render, len(light_mesh), cells, points, limit)
+    shares = render.bake(rows, light_mesh.samples, octree, progress)
+    made_of = bake_hash(world, light_mesh, octree.frame.resolution // SIDE, points)
+    return make_baked(octree.frame, air, rows, shares, made_of)
 
 
 def _fitting_rows(

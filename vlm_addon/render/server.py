@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The renderer's process: reads scenes from its standard input, renders, answers; ends when the input closes.
 
-Messages in: `render` (scene, settings, where its arrays lie), `cancel`. Messages out: `hello`, `progress`, `frame`,
-`error`. Arrays lie in files of a folder that the parent owns.
+Messages in: `render` (scene, settings, where its arrays lie), `bake_visibility` (the same), `cancel`. Messages out:
+`hello`, `progress`, `frame`, `visibility`, `error`. Arrays lie in files of a folder that the parent owns.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from typing import Any, BinaryIO
 
 from ..core.array_codec import flatten, unflatten
 from ..core.errors import Cancelled, DeviceError, InvalidInput, VlmError
+from ..core.light_mesh import VirtualLightMesh, empty_light_mesh
+from ..core.scene import SceneSnapshot
 from ..core.scene_codec import light_mesh_from_tree, snapshot_from_tree
 from .device import Device
 from .frame_types import RenderSettings
@@ -72,10 +74,11 @@ class _Server:
                 self.requests.put(message)
 
     def answer(self, request: dict[str, Any]) -> None:
-        """Renders one picture and sends it, or the error in its place."""
+        """Renders one picture, or bakes, and sends it, or the error in its place."""
         self._number = request["number"]
+        work = self._bake_visibility if request["type"] == "bake_visibility" else self._render
         try:
-            self._send(self._render(request))
+            self._send(work(request))
         except VlmError as error:
             self._send(_error_message(error))
         except Exception as error:  # noqa: BLE001  a bug in one picture must not end the process silently
@@ -86,19 +89,27 @@ class _Server:
     def _send(self, message: dict[str, Any]) -> None:
         write_message(self._answers, {**message, "number": self._number})
 
-    def _render(self, request: dict[str, Any]) -> dict[str, Any]:
+    def _scene(self, request: dict[str, Any]) -> tuple[SceneSnapshot, VirtualLightMesh | None]:
         arrays = map_arrays(self._folder / request["file"], request["arrays"])
         tree = unflatten(request["scene"], arrays)
         lights = tree["light_mesh"]
-        frame = self._device.render(
-            snapshot_from_tree(tree["snapshot"]),
-            light_mesh_from_tree(lights) if lights is not None else None,
-            RenderSettings(**request["settings"]),
-            self._progress,
+        return snapshot_from_tree(tree["snapshot"]), light_mesh_from_tree(lights) if lights is not None else None
+
+    def _render(self, request: dict[str, Any]) -> dict[str, Any]:
+        settings = RenderSettings(**request["settings"])
+        return self._answer("frame", self._device.render(*self._scene(request), settings, self._progress))
+
+    def _bake_visibility(self, request: dict[str, Any]) -> dict[str, Any]:
+        snapshot, lights = self._scene(request)
+        lights = empty_light_mesh() if lights is None else lights
+        return self._answer(
+            "visibility", self._device.bake_visibility(snapshot, lights, **request["settings"], progress=self._progress)
         )
-        answer, images = flatten(frame)
-        file = f"frame-{request['number']}.bin"
-        return {"type": "frame", "frame": answer, "file": file, "arrays": store_arrays(self._folder / file, images)}
+
+    def _answer(self, kind: str, value: Any) -> dict[str, Any]:
+        answer, arrays = flatten(value)
+        file = f"{kind}-{self._number}.bin"
+        return {"type": kind, kind: answer, "file": file, "arrays": store_arrays(self._folder / file, arrays)}
 
     def _progress(self, fraction: float, label: str) -> bool:
         self._send({"type": "progress", "fraction": fraction, "label": label})

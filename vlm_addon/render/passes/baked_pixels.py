@@ -47,8 +47,8 @@ _ROUNDS = MOST_ENTRIES + MOST_ENTRIES // 4
 class GpuBakedVisibility:
     """Baked visibility on the device. light_shares: rows of bytes, four in a word."""
 
-    def __init__(self, context: moderngl.Context, baked: BakedVisibility, ways: int = 0) -> None:
-        """ways: between points that were looked at to make it. Raises DeviceError where a block does not hold it."""
+    def __init__(self, context: moderngl.Context, baked: BakedVisibility) -> None:
+        """Raises DeviceError where a block does not hold it."""
 
         def upload(values: np.ndarray) -> moderngl.Buffer:
             require_room(context, values.nbytes)
@@ -56,7 +56,6 @@ class GpuBakedVisibility:
 
         self._context = context
         self.baked = baked
-        self.ways = ways
         cells = baked.cells
         self._buffers = [
             upload(np.stack([cells.first_zone[:-1], cells.label_start], axis=1)),
