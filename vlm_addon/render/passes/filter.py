@@ -67,10 +67,10 @@ class FilterSettings:
     )
     filter_cosine: float = setting(
         0.9,
-        "",
+        "cosine",
         -1.0,
         1.0,
-        "Cosine between normals from which on neighbours count",
+        "Of the angle between normals, from which on neighbours count",
         source="004, 4.12: geometric threshold",
         only_with=WITH_FILTER,
     )

@@ -73,7 +73,7 @@ class Lights:
         "brings too little",
         source="004, 3.3: a preset epsilon",
     )
-    seed: int = setting(0, "", 0, 65535, "Another seed moves all lights to other places", source=OWN)
+    seed: int = setting(0, "number", 0, 65535, "Another seed moves all lights to other places", source=OWN)
 
 
 @dataclass(frozen=True)
