@@ -32,8 +32,8 @@ from ..shader_library import ShaderLibrary, set_uniforms
 if TYPE_CHECKING:
     import moderngl
 
-# Some seconds on two cores without a GPU, so that a cancellation is heard; some milliseconds with one.
-RAYS_PER_DISPATCH = 1 << 20
+# About a second on two cores without a GPU, so that a cancellation is heard; less than a millisecond with one.
+RAYS_PER_DISPATCH = 1 << 18
 EXACT_REACH = OctreeSettings().exact_reach
 """Voxels near the ends of ways where triangles are asked, unless told: as without a bake."""
 BAKED_DEFINES: dict[str, int | float | bool | str] = {
