@@ -25,6 +25,13 @@ layout(std430, binding = LIGHT_WINDOW_BINDING) readonly buffer LightWindows { ve
 
 // One bit for each light of a batch, by class.
 shared uint members[CLASSES * WORDS];
+#if BAKED
+// One bit for each light of a batch that all of the tile sees whole.
+shared uint wholes[WORDS];
+#define LOOK_AT(WORD, BIT) is_whole = (wholes[WORD] >> BIT & 1u) != 0u
+#else
+#define LOOK_AT(WORD, BIT)
+#endif
 
 // Sorts the GROUP_SIZE lights from `first` on into `members`, one for each invocation.
 void classify(PointGroup group, uint first, uint end) {
@@ -32,12 +39,24 @@ void classify(PointGroup group, uint first, uint end) {
     if (index < uint(CLASSES * WORDS)) {
         members[index] = 0u;
     }
+#if BAKED
+    if (index < uint(WORDS)) {
+        wholes[index] = 0u;
+    }
+#endif
     barrier();
     uint at = first + index;
     if (at < end) {
         VirtualLight light = lights[entry(at)];
         int class_of_light =
             light_class(group, light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius);
+#if BAKED
+        int seen = class_of_light == LIGHT_GIVES_NOTHING ? TILE_SEES_NOTHING : tile_sees(entry(at));
+        class_of_light = seen == TILE_SEES_NOTHING ? LIGHT_GIVES_NOTHING : class_of_light;
+        if (seen == TILE_SEES_WHOLE) {
+            atomicOr(wholes[index / 32u], 1u << (index % 32u));
+        }
+#endif
         if (class_of_light != LIGHT_GIVES_NOTHING) {
             atomicOr(members[uint(class_of_light - 1) * WORDS + index / 32u], 1u << (index % 32u));
         }
@@ -50,8 +69,10 @@ void classify(PointGroup group, uint first, uint end) {
     for (int word = 0; word < WORDS; ++word) { \
         uint bits = members[(CLASS - 1) * WORDS + word]; \
         while (bits != 0u) { \
-            uint i = entry(first + uint(32 * word + findLSB(bits))); \
+            int bit = findLSB(bits); \
+            uint i = entry(first + uint(32 * word + bit)); \
             bits &= bits - 1u; \
+            LOOK_AT(word, bit); \
             VirtualLight light = lights[i]; \
             vec3 radiosity = radiosities[i].rgb; \
             for (int k = 0; k < PIXELS; ++k) { \
@@ -71,6 +92,9 @@ void main() {
     }
     fetch_pixels(tile);
     start_sums(tile);
+#if BAKED
+    gather_tile_rows();
+#endif
     for (uint first = run.x; first < run.y; first += GROUP_SIZE) {
         classify(group, first, run.y);
         start_batch();

@@ -14,11 +14,18 @@ layout(std430, binding = LIGHT_CLUSTER_BINDING) readonly buffer LightClusters { 
 
 // One bit for each cluster of a batch that may light the tile.
 shared uint members[WORDS];
+#if BAKED
+// And for each that all of the tile sees whole.
+shared uint wholes[WORDS];
+#endif
 
 void classify(PointGroup group, uint first, uint end) {
     uint index = gl_LocalInvocationIndex;
     if (index < uint(WORDS)) {
         members[index] = 0u;
+#if BAKED
+        wholes[index] = 0u;
+#endif
     }
     barrier();
     uint at = first + index;
@@ -26,7 +33,15 @@ void classify(PointGroup group, uint first, uint end) {
         LightNode node = nodes[entries[at]];
         bool is_lit = any(greaterThan(clusters[entries[at]].power, vec3(0.0)));
         bool counts = distance_range(group, node.centre).y > node.window;
-        if (is_lit && counts && !cluster_gives_nothing(group, node)) {
+        bool gives = is_lit && counts && !cluster_gives_nothing(group, node);
+#if BAKED
+        int seen = gives ? tile_sees(entries[at]) : TILE_SEES_NOTHING;
+        gives = seen != TILE_SEES_NOTHING;
+        if (seen == TILE_SEES_WHOLE) {
+            atomicOr(wholes[index / 32u], 1u << (index % 32u));
+        }
+#endif
+        if (gives) {
             atomicOr(members[index / 32u], 1u << (index % 32u));
         }
     }
@@ -42,14 +57,21 @@ void main() {
     PointGroup group = tiles[tile];
     fetch_pixels(tile);
     start_sums(tile);
+#if BAKED
+    gather_tile_rows();
+#endif
     for (uint first = run.x; first < run.y; first += GROUP_SIZE) {
         classify(group, first, run.y);
         start_batch();
         for (int word = 0; word < WORDS; ++word) {
             uint bits = members[word];
             while (bits != 0u) {
-                uint i = entries[first + uint(32 * word + findLSB(bits))];
+                int bit = findLSB(bits);
+                uint i = entries[first + uint(32 * word + bit)];
                 bits &= bits - 1u;
+#if BAKED
+                is_whole = (wholes[word] >> bit & 1u) != 0u;
+#endif
                 LightNode node = nodes[i];
                 LightCluster cluster = clusters[i];
                 for (int k = 0; k < PIXELS; ++k) {

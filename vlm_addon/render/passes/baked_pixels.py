@@ -41,7 +41,7 @@ LIGHT_SUM_DEFINES: dict[str, int | float | bool | str] = {
 }
 """What passes/light_sum.glsl needs to multiply what it meets by visibility."""
 # Rounds of loops more for each light and pixel than the one without visibility; a light takes one, too.
-_ROUNDS = MOST_ENTRIES + MOST_ENTRIES // 4
+_ROUNDS = MOST_ENTRIES // 4
 
 
 class GpuBakedVisibility:
