@@ -195,6 +195,16 @@ def test_a_picture_is_nearer_to_many_rays_than_one_without_visibility(device: De
     assert error(found) < 0.4 * error(plain)
 
 
+def test_the_picture_of_visibility_is_what_the_light_is_multiplied_by(device: Device, lights: VirtualLightMesh) -> None:
+    room = lit(block_room())
+    found = device.render(room, lights, settings())
+    plain = irradiance(device.render(room, lights, settings(visibility="none")))
+    seen = found.images["vlm_visibility"]
+    assert seen == pytest.approx(irradiance(found) / plain, rel=1e-5)
+    assert 0.0 <= seen.min() < 0.5
+    assert seen.max() <= 1.0
+
+
 def test_all_lights_cells_and_clusters_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(vlm, "FEW_LIGHTS", 0)
     room, lights = lit(block_room()), surface_lights(block_room(), 2)

@@ -7,6 +7,8 @@ import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...core.baked_visibility import CELL_COUNTS, MOST_POINTS
 from ...core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings
 from ...core.range_grid import RangeSettings
@@ -17,6 +19,7 @@ from ..baked_lights import BakedLights
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
 from ..light_visibility import OctreeVisibility, scene_occlusion
 from ..octree_settings import OctreeSettings
+from ..passes.accumulate import read_image
 from ..passes.filter import FilterSettings
 from ..passes.light_picks import MOST_PICKS
 from ..passes.phase_one import PhaseOnePass
@@ -136,7 +139,10 @@ class VirtualLightMeshTechnique(Technique):
             )
         before = dict(scene.kept.built)
         self._baked, baked_reasons = self._chosen_bake()
-        self._sum = self._chosen_sum()
+        self._sum = self._chosen_sum(self._baked)
+        # For the picture of visibility alone.
+        self._unoccluded = self._chosen_sum(None) if self._baked is not None and scene.settings.buffers else None
+        self._seen: Float32 | None = None
         kinds = self._sum.kinds if self._baked is None else (*self._sum.kinds, *self._baked.kinds)
         self._built = {f"{kind}_built": scene.kept.built.get(kind, 0) - before.get(kind, 0) for kind in kinds}
         self._visibility, octree_reasons = self._chosen_visibility()
@@ -152,9 +158,9 @@ class VirtualLightMeshTechnique(Technique):
             return None, [f"no visibility is baked: {occlusion.reason}"]
         return BakedLights(self.scene, self.chosen), []
 
-    def _chosen_sum(self) -> LightSum:
+    def _chosen_sum(self, baked: BakedLights | None) -> LightSum:
         """How the lights are summed."""
-        chosen, inputs = self.chosen, (self.scene, self._lights, self._radiosity, self._baked)
+        chosen, inputs = self.chosen, (self.scene, self._lights, self._radiosity, baked)
         if chosen.lights == RANGE:
             return CellSum(*inputs, RangeSettings(chosen.grid, chosen.range, chosen.max_lights))
         if chosen.lights == TOLERANCE and self._lights.count > FEW_LIGHTS:
@@ -179,11 +185,19 @@ class VirtualLightMeshTechnique(Technique):
             self._baked.find(frame)
         with self.scene.timer.measure("phase two"):
             irradiance = self._sum.render(frame.gbuffer, lambda done, label: frame.progress(share * done, label))
+        if self._unoccluded is not None:
+            seen, whole = (read_image(image)[..., :3] for image in (irradiance, self._unoccluded_sum(frame)))
+            self._seen = np.where(whole > 0.0, seen / np.where(whole > 0.0, whole, 1.0), 1.0).astype(np.float32)
         if self._visibility is None:
             return irradiance
         return self._visibility.render(
             frame, irradiance, lambda done, label: frame.progress(share + (1.0 - share) * done, label)
         )
+
+    def _unoccluded_sum(self, frame: FrameInputs) -> moderngl.Texture:
+        assert self._unoccluded is not None
+        with self.scene.timer.measure("phase two without visibility"):
+            return self._unoccluded.render(frame.gbuffer, frame.progress)
 
     def counters(self) -> dict[str, float]:
         """Virtual lights, which structures were built in this frame (0: kept), what their lists hold, and rays."""
@@ -192,8 +206,10 @@ class VirtualLightMeshTechnique(Technique):
         return {"virtual_lights": self._lights.count, **self._built, **self._sum.counters(), **found}
 
     def images(self) -> dict[str, Float32]:
-        """Of OctreeVisibility, where rays are cast."""
+        """Of OctreeVisibility, where rays are cast; baked, the share of the light of the last picture that gets there."""
         found = {} if self._visibility is None else self._visibility.images()
+        if self._seen is not None:
+            found["visibility"] = self._seen
         return {f"{self.name}_{name}": image for name, image in found.items()}
 
     def reasons(self) -> list[str]:
