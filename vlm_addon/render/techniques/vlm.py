@@ -206,7 +206,7 @@ class VirtualLightMeshTechnique(Technique):
         return {"virtual_lights": self._lights.count, **self._built, **self._sum.counters(), **found}
 
     def images(self) -> dict[str, Float32]:
-        """Of OctreeVisibility, where rays are cast; baked, the share of the light of the last picture that gets there."""
+        """Of OctreeVisibility where rays are cast; the share of the light that gets there where visibility is baked."""
         found = {} if self._visibility is None else self._visibility.images()
         if self._seen is not None:
             found["visibility"] = self._seen
