@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support import open_sample
-from vlm_addon.core.brick_triangles import ALL_EXACT
+from vlm_addon.core.brick_triangles import ALL_EXACT, LIFT_SHARE
 from vlm_addon.core.octree_march import FAR_OUTSIDE
 from vlm_addon.core.scene import Float32, Float64, SceneSnapshot
 from vlm_addon.core.surface_points import random_surface_points
@@ -44,10 +44,12 @@ from vlm_addon.terminal import table
 RAYS_SHADER = "../benchmarks/octree_rays.comp"
 _BINDINGS = {"PAIR_BINDING": 0, "RESULT_BINDING": 1, "OCTREE_BINDING": 2, "OCTREE_TRIANGLE_BINDING": 3}
 EXACT_RAYS = 10_000
-# Voxels: how far over their plane ways begin for a first hit by Blender, and how far apart two hits are one.
-LIFT, HIT_TOLERANCE = 5e-4, 0.01
+# Voxels.
+HIT_TOLERANCE = 0.01
 # Of the length of a way: what is left out at both of its ends, which lie on triangles.
 ENDS = 1e-4
+# The cosine from which on two points face each other: those of one plane do so by nothing but rounding.
+GRAZING = 1e-3
 SCENES, RESOLUTIONS, RAYS = ("cornell_box", "atrium"), (64, 128, 256), 200_000
 REACHES = (0, 1, 2, 4, ALL_EXACT)
 REPEATS = 3
@@ -155,7 +157,7 @@ def ray_rows(
         rows.append(ray_row("all" if reach == ALL_EXACT else str(reach), seen, times, shares))
     ways = random_ways(pairs)
     hits, *times = best(device, rays_of(device, built, ways, {"FIRST_HIT": True}))
-    shares = differences(hits[:EXACT_RAYS], caster.first_hits(ways[:EXACT_RAYS]))
+    shares = differences(hits[:EXACT_RAYS], caster.first_hits(ways[:EXACT_RAYS], LIFT_SHARE * frame.resolution))
     return [*rows, ray_row("first hit", hits[:, 3] == 0.0, times, shares)]
 
 
@@ -197,7 +199,9 @@ def facing_pairs(snapshot: SceneSnapshot, frame: VoxelFrame, count: int) -> Floa
     places, normals = frame.voxels(points.positions), points.normals.astype(np.float64)
     half = len(places) // 2
     way = places[half:] - places[:half]
-    faces = (np.einsum("ij,ij->i", normals[:half], way) > 0.0) & (np.einsum("ij,ij->i", normals[half:], way) < 0.0)
+    least = GRAZING * np.linalg.norm(way, axis=1)
+    towards, back = (np.einsum("ij,ij->i", side, way) for side in (normals[:half], normals[half:]))
+    faces = (towards > least) & (back < -least)
     rows = np.flatnonzero(faces)[:count]
     pairs = np.zeros((len(rows), 4, 4), np.float32)
     for column, values in enumerate((places[:half], normals[:half], places[half:], normals[half:])):
@@ -250,10 +254,10 @@ class Caster:
         lengths = (1.0 - 2.0 * ENDS) * np.linalg.norm(ways, axis=1)
         return np.array([self._cast(*ray)[0] is None for ray in zip(starts, ways, lengths, strict=True)])
 
-    def first_hits(self, ways: Float32) -> Float32:
-        """(p, 4): places of the first triangles along ways that begin on one, and 1; of zeros where there is none."""
+    def first_hits(self, ways: Float32, lift: float) -> Float32:
+        """(p, 4): places of the first triangles along ways that begin by `lift` over one, and 1; zeros where none."""
         result = np.zeros((len(ways), 4), np.float32)
-        starts = ways[:, 0, :3] + LIFT * ways[:, 1, :3]
+        starts = ways[:, 0, :3] + lift * ways[:, 1, :3]
         for row, (start, along) in enumerate(zip(starts.astype(float), ways[:, 2, :3].astype(float), strict=True)):
             place = self._cast(start, along, float(FAR_OUTSIDE))[0]
             if place is not None:

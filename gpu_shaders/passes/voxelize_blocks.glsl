@@ -28,14 +28,3 @@ VoxelTriangle triangle_at(uint index) {
     vec4 a = triangles[3u * index], b = triangles[3u * index + 1u], c = triangles[3u * index + 2u];
     return VoxelTriangle(a.xyz, b.xyz, c.xyz, vec3(a.w, b.w, c.w));
 }
-
-// Bits of the voxels of a brick that a triangle meets: 8 times the octant of 2 x 2 x 2 voxels plus its own in there.
-uvec2 voxels_that_meet(VoxelTriangle triangle, uvec3 brick, float growth) {
-    uvec2 mask = uvec2(0u);
-    for (uint left = cells_that_meet(triangle, 2u * brick, 2.0, growth); left != 0u; left &= left - 1u) {
-        uint i = uint(findLSB(left));
-        uvec3 first = 4u * brick + 2u * uvec3(i & 1u, i >> 1 & 1u, i >> 2);
-        mask[i / 4u] |= cells_that_meet(triangle, first, 1.0, growth) << (8u * (i % 4u));
-    }
-    return mask;
-}

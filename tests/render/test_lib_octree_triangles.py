@@ -28,6 +28,14 @@ vec2 list_nearest(vec3 p, vec3 a, vec3 b) {
     OctreeCrossing found = octree_list_nearest(0u, LISTED, octree_ray(a, b), octree_edge_slack(), none);
     return vec2(found.fraction, found.triangle);
 }
+// Of two as near, the one of the smaller number, in whatever order they come.
+float keeps_smaller(vec3 p, vec3 a, vec3 b) {
+    OctreeRay ray = octree_ray(a, b);
+    OctreeCrossing found = OctreeCrossing(OCTREE_NO_CROSSING, 0u, 0u);
+    found = octree_list_nearest(0u, LISTED, ray, octree_edge_slack(), found);
+    OctreeCrossing later = OctreeCrossing(found.fraction, 0u, found.triangle + 1u);
+    return float(octree_list_nearest(0u, LISTED, ray, octree_edge_slack(), later).triangle == found.triangle);
+}
 vec2 tree_nearest(uint tree, vec3 a, vec3 b) {
     OctreeCrossing none = OctreeCrossing(OCTREE_NO_CROSSING, tree, 0u);
     OctreeCrossing found = octree_tree_nearest(tree, a, b, none);
@@ -306,6 +314,8 @@ def test_of_two_triangles_in_one_place_the_first_is_met(device):
     found = ask_exact(device, "hit_reflectance(octree_first_hit(p, vec3(0.0), d))", inputs, 4, LIST)
     assert found[:32, :3] == pytest.approx(np.tile(np.linspace(0.0, 0.5, 18)[3:6], (32, 1)))
     assert found[32:, :3] == pytest.approx(np.tile(np.linspace(0.0, 0.5, 18)[:3], (32, 1)))
+    way = {"p": np.array([[8.0, 8.0, 7.9]]), "a": np.array([[8.0, 8.0, 10.0]]), "b": np.array([[8.0, 8.0, 6.0]])}
+    assert ask_exact(device, "keeps_smaller(p, a, b)", way, 1, LIST) == 1.0
     del kept
 
 

@@ -31,23 +31,22 @@ LIST_HEADER_WORDS = 8
 RECORD_WORDS = 16
 """Of a triangle: three corners with a component of the normal each, and its reflectance."""
 
-_NAMES = ("TRIANGLE", "BLOCK", "BIT", "RANK", "OCTREE", "VOXEL", "COUNT", "LIST")
+_NAMES = ("MEETING", "BLOCK", "BIT", "RANK", "OCTREE", "VOXEL", "COUNT", "LIST")
 _BINDINGS = {f"{name}_BINDING": binding for binding, name in enumerate(_NAMES)}
 
 
 @dataclass(frozen=True)
 class BrickPairs:
-    """What a voxelisation knows. triangles: as voxelize_blocks.glsl reads them; blocks: `count` pairs of a packed brick
-    and a triangle; bits, ranks: of the bricks along the Z-order curve from word `brick_word` on; growth: of voxels on
-    each side; octree, first_brick, brick_count: the bricks in the tree's buffer."""
+    """What a voxelisation knows. blocks: `count` pairs of a packed brick and a triangle; masks: the voxels in which the
+    two meet; bits, ranks: of the bricks along the Z-order curve from word `brick_word` on; octree, first_brick,
+    brick_count: the bricks in the tree's buffer."""
 
-    triangles: moderngl.Buffer
     blocks: moderngl.Buffer
+    masks: moderngl.Buffer
     count: int
     bits: moderngl.Buffer
     ranks: moderngl.Buffer
     brick_word: int
-    growth: float
     octree: moderngl.Buffer
     first_brick: int
     brick_count: int
@@ -156,7 +155,6 @@ class VoxelListPass:
             "brick_word": pairs.brick_word,
             "first_brick": pairs.first_brick,
             "first_list": first_list,
-            "growth": pairs.growth,
         }
         set_uniforms(shader, values)
         run_for_each(self._context, shader, count)
@@ -169,7 +167,7 @@ def _header(places: Sequence[tuple[int, int, int, int]]) -> bytes:
 
 
 def _bind_pairs(pairs: BrickPairs, voxels: moderngl.Buffer, counts: moderngl.Buffer) -> None:
-    _bind(TRIANGLE=pairs.triangles, BLOCK=pairs.blocks, BIT=pairs.bits, RANK=pairs.ranks)
+    _bind(MEETING=pairs.masks, BLOCK=pairs.blocks, BIT=pairs.bits, RANK=pairs.ranks)
     _bind(OCTREE=pairs.octree, VOXEL=voxels, COUNT=counts)
 
 

@@ -44,8 +44,8 @@ _WORD_BITS = 32
 HEADER_WORDS = 8
 """Before the trees in a buffer; see `_header`."""
 MOST_TREES = 2
-# Bytes: of one triangle, and of a block and its mask.
-_TRIANGLE_BYTES, _BLOCK_BYTES = 48, 8
+# Bytes: of one triangle, of a block and its mask, and of a mask of a brick's voxels.
+_TRIANGLE_BYTES, _BLOCK_BYTES, _MASK_BYTES = 48, 8, 8
 
 
 def growth_of(depth: int) -> float:
@@ -120,7 +120,8 @@ class VoxelizePass:
 
         self._test = {mark: shader("test", MARK=mark) for mark in (False, True)}
         self._spread = {last: shader("spread", LAST=last) for last in (False, True)}
-        self._bricks, self._levels, self._count = shader("bricks"), shader("levels"), shader("count")
+        self._bricks = {keep: shader("bricks", KEEP=keep) for keep in (False, True)}
+        self._levels, self._count = shader("levels"), shader("count")
         self._nodes, self._clear = shader("nodes"), shader("clear")
         self._lists = VoxelListPass(context, shaders, self.pool, self._sum)
 
@@ -131,20 +132,20 @@ class VoxelizePass:
         the device has no block for the lists or the tree, or nodes are more than a word can name.
         """
         with ExitStack() as stack:
-            return self._build(stack, places, depth, target)[0]
+            return self._build(stack, places, depth, target, False)[0]
 
     def build_with_lists(
         self, places: Float64, reflectance: Float32, depth: int, target: GrowingBuffer, list_target: GrowingBuffer
     ) -> tuple[GpuTree, GpuVoxelLists]:
         """As `build`, and the triangles of each voxel in `list_target`'s buffer. reflectance: (t, 3)."""
         with ExitStack() as stack:
-            tree, pairs = self._build(stack, places, depth, target)
+            tree, pairs = self._build(stack, places, depth, target, True)
             records = np.zeros((len(places), 4, 4), np.float32)
             records[:, :3], records[:, 3, :3] = triangle_records(places, depth), reflectance
             return tree, self._lists.fill(pairs, records, list_target)
 
     def _build(
-        self, stack: ExitStack, places: Float64, depth: int, target: GrowingBuffer
+        self, stack: ExitStack, places: Float64, depth: int, target: GrowingBuffer, keeps_masks: bool
     ) -> tuple[GpuTree, BrickPairs]:
         require_places(places, depth)
         layout = _layout(depth)
@@ -156,13 +157,13 @@ class VoxelizePass:
         self._link_levels(bits, ranks, layout)
         tree = self._allocated(ranks, layout, target)
         self._write_nodes(tree, bits, ranks, layout)
-        _bind(TRIANGLE=triangles, BLOCK=pairs)
+        masks = self._take(stack, _MASK_BYTES * pair_count if keeps_masks else 0)
+        _bind(TRIANGLE=triangles, BLOCK=pairs, MEETING=masks)
         brick_word, first_brick = layout.starts[layout.brick_level], HEADER_WORDS + tree.node_count
-        growth = growth_of(depth)
-        values = {"block_count": pair_count, "growth": growth, "brick_word": brick_word, "first_brick": first_brick}
-        self._run(self._bricks, pair_count, values)
+        values = {"block_count": pair_count, "brick_word": brick_word, "first_brick": first_brick}
+        self._run(self._bricks[keeps_masks], pair_count, {**values, "growth": growth_of(depth)})
         listed = BrickPairs(
-            triangles, pairs, pair_count, bits, ranks, brick_word, growth, tree.buffer, first_brick, tree.brick_count
+            pairs, masks, pair_count, bits, ranks, brick_word, tree.buffer, first_brick, tree.brick_count
         )
         return tree, listed
 
