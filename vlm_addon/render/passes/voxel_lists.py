@@ -81,9 +81,12 @@ class GpuVoxelLists:
 
     def places(self, first: int) -> tuple[int, int, int, int]:
         """First words of the parts where they begin at word `first`: the header's words for a tree."""
-        sizes = self.brick_count, self.voxel_count + 1, self.pair_count
-        voxels, starts, lists, triangles = np.cumsum([first, *sizes]).tolist()
-        return voxels, starts, lists, triangles
+        return _places(first, self.brick_count, self.voxel_count, self.pair_count)
+
+
+def _places(first: int, brick_count: int, voxel_count: int, pair_count: int) -> tuple[int, int, int, int]:
+    voxels, starts, lists, triangles = np.cumsum([first, brick_count, voxel_count + 1, pair_count]).tolist()
+    return voxels, starts, lists, triangles
 
 
 class VoxelListPass:
@@ -113,9 +116,9 @@ class VoxelListPass:
             _bind_pairs(pairs, voxels, counts)
             self._run(self._lists[False], pairs, pairs.count)
             pair_count = self._summed(counts, voxel_count)
-            sizes = pairs.brick_count, voxel_count, pair_count, len(records)
-            places = GpuVoxelLists(pairs.blocks, *sizes).places(LIST_HEADER_WORDS)
-            lists = GpuVoxelLists(target.of(4 * places[-1] + records.nbytes), *sizes)
+            sizes = pairs.brick_count, voxel_count, pair_count
+            places = _places(LIST_HEADER_WORDS, *sizes)
+            lists = GpuVoxelLists(target.of(4 * places[-1] + records.nbytes), *sizes, len(records))
             lists.buffer.write(_header([places]))
             if len(records):
                 lists.buffer.write(records.tobytes(), offset=4 * places[-1])
