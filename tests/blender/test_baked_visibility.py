@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked visibility in sample scenes: against Cycles, and of a closed room within a lit hall."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
+
+from tests.render.closed_rooms import inward_box  # noqa: E402
+from tests.render.rooms import camera_at  # noqa: E402
+from vlm_addon.blender.cycles_reference import render_reference  # noqa: E402
+from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.core.light_mesh import join  # noqa: E402
+from vlm_addon.core.metrics import relative_rmse  # noqa: E402
+from vlm_addon.core.simplify import SimplifySettings, create_light_mesh, subdivide_light_mesh  # noqa: E402
+from vlm_addon.render.device import Device  # noqa: E402
+from vlm_addon.render.frame_types import RenderSettings  # noqa: E402
+
+FOLDER = Path(__file__).resolve().parents[2] / "sample_blends"
+
+
+@pytest.fixture(scope="module")
+def device():
+    with Device() as opened:
+        yield opened
+
+
+def opened(name):
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
+    return extract_scene()
+
+
+@pytest.mark.full
+def test_baked_visibility_halves_the_error_against_cycles_in_cornell_box(device):
+    snapshot = opened("cornell_box")
+    shape = create_light_mesh(snapshot.meshes, SimplifySettings(target_triangles=500)).light_mesh
+    light_mesh = subdivide_light_mesh(shape, 2000)
+    reference = render_reference(64, 64, 1, 4096)
+    errors = []
+    for visibility in ("none", "baked"):
+        settings = RenderSettings(64, 64, "vlm", {"visibility": visibility}, 8, shadow_samples=8)
+        image = device.render(snapshot, light_mesh, settings).images["indirect"]
+        errors.append(relative_rmse(image, reference.images["indirect"]))
+    without, baked = errors
+    assert reference.noise["indirect"] < 0.2 * (0.5 * without)
+    assert baked <= 0.5 * without
+
+
+def white(walls):
+    return [replace(wall, reflectance=np.full((2, 3), 0.7, np.float32)) for wall in walls]
+
+
+@pytest.mark.full
+def test_a_closed_room_in_the_atrium_stays_black(device):
+    """Of walls of 10 cm, thinner than a voxel, each side of which has lights of its own."""
+    atrium = opened("atrium")
+    inner = white(inward_box([-1.5, -1.5, 0.1], [1.5, 1.5, 3.0], [0] * 6))
+    outer = white(inward_box([-1.6, -1.6, 0.0], [1.6, 1.6, 3.1], [0] * 6, outward=True))
+    parts = [create_light_mesh(meshes, SimplifySettings(400)).light_mesh for meshes in (atrium.meshes, inner, outer)]
+    light_mesh = join([parts[0], *(subdivide_light_mesh(part, 100) for part in parts[1:])])
+    hall = replace(atrium, meshes=(*atrium.meshes, *inner, *outer))
+    room = replace(hall, camera=camera_at((-1.3, -1.3, 2.0), (1.0, 1.0, 0.8), lens=18.0))
+
+    def picture(scene, visibility):
+        chosen = {"visibility": visibility, "visibility_cells": 8}
+        settings = RenderSettings(48, 32, "vlm", chosen, 2, shadow_samples=1)
+        return device.render(scene, light_mesh, settings).images["indirect"]
+
+    lit, dark = picture(hall, "baked"), picture(room, "baked")
+    assert picture(room, "none").mean() > 0.05 * lit.mean()
+    assert dark.max() <= 1e-3 * lit.mean()
