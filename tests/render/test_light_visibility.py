@@ -12,6 +12,7 @@ import pytest
 from tests.render.closed_rooms import inward_box
 from tests.render.occluded_room import corners_of, room, wall_lights
 from tests.render.rooms import camera_at, lights_from_triangles, quad, split
+from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.occluders import Occlusion
 from vlm_addon.core.scene import DIFFUSE, POINT, Light, Material, SceneSnapshot
@@ -122,3 +123,18 @@ def test_a_closed_room_beside_a_lit_one_stays_black(device: Device, mode: dict[s
     # Without visibility the wall hides nothing.
     assert leaks["dark"] > 0.05 * leaks["lit"]
     assert most["dark"] <= 1e-3 * mean["lit"]
+
+
+@pytest.mark.parametrize("stop_at", ["phase two", "pick lights", "visibility"])
+def test_stop_is_heard_while_rays_are_cast(device: Device, stop_at: str) -> None:
+    labels: list[str] = []
+
+    def watch(fraction: float, label: str) -> bool:
+        labels.append(label)
+        return label != stop_at
+
+    settings = RenderSettings(16, 12, "vlm", {"visibility": "octree"}, 1, 32, 1)
+    with pytest.raises(Cancelled):
+        device.render(lit(room()), wall_light_mesh(), settings, watch)
+    assert labels[-1] == stop_at
+    assert labels.count(stop_at) == 1
