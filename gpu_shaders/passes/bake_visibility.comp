@@ -25,6 +25,14 @@ uniform uint words_per_row;
 uniform uint first_pair;
 uniform uint end_pair;
 
+// Most ways are clear of voxels, and what they pass nearer than a voxel to their ends is smaller than a row: triangles are
+// asked where voxels block, unless all are to be exact.
+bool see(Facet from, Facet to) {
+    vec3 place = from.place.xyz, normal = from.normal.xyz, other_place = to.place.xyz, other_normal = to.normal.xyz;
+    bool is_clear = EXACT_REACH < OCTREE_ALL_EXACT && octree_surfaces_see(place, normal, other_place, other_normal);
+    return is_clear || octree_points_see(place, normal, other_place, other_normal, EXACT_REACH);
+}
+
 void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint pair = first_pair + group * GROUP_SIZE + gl_LocalInvocationID.x;
@@ -39,8 +47,7 @@ void main() {
         vec3 way = to.place.xyz - from.place.xyz;
         if (surfaces_face(way, from.normal.xyz, to.normal.xyz)) {
             ++facing;
-            bool sees = octree_points_see(from.place.xyz, from.normal.xyz, to.place.xyz, to.normal.xyz, EXACT_REACH);
-            seen += sees ? 1u : 0u;
+            seen += see(from, to) ? 1u : 0u;
         }
     }
     uint share = facing == 0u ? BAKED_UNFACED : (2u * BAKED_FULL * seen + facing) / (2u * facing);

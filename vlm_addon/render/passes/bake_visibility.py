@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 # About a second on two cores without a GPU, so that a cancellation is heard; less than a millisecond with one.
 RAYS_PER_DISPATCH = 1 << 18
 EXACT_REACH = OctreeSettings().exact_reach
-"""Voxels near the ends of ways where triangles are asked, unless told: as without a bake."""
+"""Voxels near the ends of ways where triangles are asked if voxels block: as without a bake."""
 BAKED_DEFINES: dict[str, int | float | bool | str] = {
     "BAKED_WEIGHT_STEPS": f"{WEIGHT_STEPS}u",
     "BAKED_WEIGHT_BITS": f"{WEIGHT_STEPS.bit_length()}u",
@@ -69,7 +69,7 @@ class BakeVisibilityPass:
     """Casts the rays; everything in the voxel coordinates of one octree."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, exact_reach: int = EXACT_REACH) -> None:
-        """exact_reach: as in lib/octree_triangles.glsl."""
+        """exact_reach: as in lib/octree_triangles.glsl; below ALL_EXACT, ways that are clear of voxels are open."""
         self._context = context
         self._pool = BufferPool(context)
         defines = {**_BINDINGS, **BAKED_DEFINES, "GROUP_SIZE": INVOCATIONS, "EXACT_REACH": exact_reach}
