@@ -60,19 +60,7 @@ def test_a_small_picture_of_cornell_box_is_twice_as_near_to_cycles(device):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(
-    ("name", "shape_lights"),
-    [
-        ("cornell_box", 500),
-        pytest.param(
-            "monkey_box",
-            1500,
-            marks=pytest.mark.xfail(
-                strict=True, reason="0.55: in the monkey's hollows, 1,500 lights do not show what a ray is blocked by"
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize(("name", "shape_lights"), [("cornell_box", 500), ("monkey_box", 1500)])
 def test_visibility_halves_the_error_against_cycles(device, name, shape_lights):
     without, with_visibility, noise = errors(device, name, shape_lights, 64, 4096, 8)
     assert noise < 0.2 * (0.5 * without)
