@@ -247,9 +247,7 @@ VIRTUAL_POINT_LIGHT = GpuStruct(
 """core.vpl.VirtualPointLights, in metres from the local origin and watts; area of the piece of surface, m².
 geometric_normal: unit, of the triangle that the light lies on, where rays to it end; 0 where none is known."""
 
-LIGHT_POINT = GpuStruct(
-    "LightPoint", (("vec3", "position"), ("float", "weight"), ("vec3", "normal"), ("int", "light"))
-)
+LIGHT_POINT = GpuStruct("LightPoint", (("vec3", "position"), ("float", "weight"), ("vec3", "normal"), ("int", "light")))
 """A source sample of the virtual light `light`, m from the local origin: where its visibility is asked for."""
 
 STRUCTS: dict[str, GpuStruct] = {

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -51,8 +52,8 @@ def seen_defines(visibility: PixelVisibility | None) -> dict[str, int | float | 
     return {} if visibility is None else visibility.defines
 
 
-class PhaseTwoPass:
-    """The sum over all lights of radiosity times form factor (seed 002, eq. 3.1 and 3.3)."""
+class LightSumPass(ABC):
+    """What every form of phase two has."""
 
     def __init__(
         self,
@@ -68,7 +69,18 @@ class PhaseTwoPass:
         self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        self._shader = shaders.compute("passes/phase_two.comp", {**_DEFINES, **seen_defines(visibility)})
+        self._prepare()
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Makes the shaders of one form."""
+
+
+class PhaseTwoPass(LightSumPass):
+    """The sum over all lights of radiosity times form factor (seed 002, eq. 3.1 and 3.3)."""
+
+    def _prepare(self) -> None:
+        self._shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **seen_defines(self._visibility)})
 
     def render(
         self, gbuffer: GBuffer, lights: GpuVirtualLights, radiosity: moderngl.Buffer, progress: Progress

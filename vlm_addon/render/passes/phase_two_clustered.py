@@ -10,18 +10,17 @@ from ..buffer_pool import BufferPool
 from ..light_forest import GpuLightForest
 from ..shader_library import Defines, ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
-from .baked_pixels import PixelVisibility
 from .gbuffer import GBuffer
 from .light_picks import LightPicks
 from .phase_two import (
     MAX_LIGHTS_PER_DISPATCH,
     PHASE_TWO_DEFINES,
-    IrradianceImage,
+    LightSumPass,
     bind_lights,
     entry_runs,
     seen_defines,
 )
-from .tile_bounds import TILE_SIDE, TileBoundsPass, Tiles
+from .tile_bounds import TILE_SIDE, Tiles
 from .tile_walk import (
     LIGHT_NODE_BINDING,
     LIST_BINDING,
@@ -50,29 +49,16 @@ _DEFINES = {
 }
 
 
-class ClusteredPhaseTwoPass:
+class ClusteredPhaseTwoPass(LightSumPass):
     """The sum over what core.light_cut finds for each pixel, a tile of pixels at a time.
 
     entries: in the lists of all tiles of the pictures so far. tiles: that showed a surface.
     """
 
-    def __init__(
-        self,
-        context: moderngl.Context,
-        shaders: ShaderLibrary,
-        width: int,
-        height: int,
-        visibility: PixelVisibility | None = None,
-    ) -> None:
-        """visibility: as of PhaseTwoPass, of clusters too."""
-        self._context = context
-        self._visibility = visibility
-        self._shaders = shaders
-        self._pool = BufferPool(context)
-        self._irradiance = IrradianceImage(context, width, height)
-        self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        self._walk = TileWalkPass(context, shaders, self._pool)
-        self._sums = _of_both(shaders, seen_defines(visibility))
+    def _prepare(self) -> None:
+        self._pool = BufferPool(self._context)
+        self._walk = TileWalkPass(self._context, self._shaders, self._pool)
+        self._sums = _of_both(self._shaders, seen_defines(self._visibility))
         self.entries = 0
         self.tiles = 0
 

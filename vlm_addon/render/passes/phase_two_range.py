@@ -14,14 +14,12 @@ from ...core.grid_frame import Bounds, GridFrame
 from ...core.progress import Progress, step
 from ..gpu_layout import HALF_BALL
 from ..local_space import LocalSpace
-from ..shader_library import ShaderLibrary, set_uniforms
+from ..shader_library import set_uniforms
 from ..virtual_lights import GpuVirtualLights
-from .baked_pixels import PixelVisibility
 from .gbuffer import GBuffer
 from .light_grid import GpuBlockLists
 from .light_picks import LightPicks
-from .phase_two import PHASE_TWO_DEFINES, IrradianceImage, bind_lights, entry_runs, seen_defines
-from .tile_bounds import TileBoundsPass
+from .phase_two import PHASE_TWO_DEFINES, LightSumPass, bind_lights, entry_runs, seen_defines
 from .tile_walk import LIST_BINDING, LIST_OFFSET_BINDING
 
 if TYPE_CHECKING:
@@ -63,24 +61,13 @@ class GpuRangeGrid:
         return self.half_balls.size // HALF_BALL.dtype.itemsize
 
 
-class RangePhaseTwoPass:
+class RangePhaseTwoPass(LightSumPass):
     """The sum over the lights of each pixel's cell; outside, over those whose active hemisphere holds it."""
 
-    def __init__(
-        self,
-        context: moderngl.Context,
-        shaders: ShaderLibrary,
-        width: int,
-        height: int,
-        visibility: PixelVisibility | None = None,
-    ) -> None:
-        """visibility: as of PhaseTwoPass."""
-        self._context = context
-        self._visibility = visibility
-        self._shaders = shaders
-        self._irradiance = IrradianceImage(context, width, height)
-        self._tile_bounds = TileBoundsPass(context, shaders, width, height)
-        self._shader = shaders.compute("passes/phase_two_range.comp", {**_DEFINES, **seen_defines(visibility)})
+    def _prepare(self) -> None:
+        self._shader = self._shaders.compute(
+            "passes/phase_two_range.comp", {**_DEFINES, **seen_defines(self._visibility)}
+        )
 
     def render(
         self,

@@ -14,7 +14,6 @@ from ...core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings
 from ...core.range_grid import RangeSettings
 from ...core.scene import Float32
 from ...core.settings import OWN, setting
-from ...core.voxel_frame import RESOLUTIONS
 from ..baked_lights import BakedLights
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
 from ..light_visibility import OctreeVisibility, scene_occlusion
@@ -36,12 +35,10 @@ SUM_SHARE = 0.4
 """Of a picture's progress, where rays are cast after the sum."""
 
 
-def _shared(settings_type: type, name: str, only_with: tuple[str, str], default: Any = None) -> Any:
-    """The setting `name` of `settings_type`, which counts where another has the value `only_with`; default: None for
-    the same."""
+def _shared(settings_type: type, name: str, only_with: tuple[str, str]) -> Any:
+    """The setting `name` of `settings_type`, which counts where another has the value `only_with`."""
     field = next(field for field in dataclasses.fields(settings_type) if field.name == name)
-    value = field.default if default is None else default
-    return dataclasses.field(default=value, metadata={**field.metadata, "only_with": only_with})
+    return dataclasses.field(default=field.default, metadata={**field.metadata, "only_with": only_with})
 
 
 @dataclass(frozen=True)
@@ -83,8 +80,7 @@ class Settings:
         only_with=WITH_OCTREE,
     )
     octree_resolution: int = _shared(OctreeSettings, "octree_resolution", WITH_OCTREE)
-    # Voxels along whole ways cost as much as triangles here, and darken.
-    exact_reach: int = _shared(OctreeSettings, "exact_reach", WITH_OCTREE, RESOLUTIONS[-1])
+    exact_reach: int = _shared(OctreeSettings, "exact_reach", WITH_OCTREE)
     filter: str = _shared(FilterSettings, "filter", WITH_OCTREE)
     filter_distance: float = _shared(FilterSettings, "filter_distance", WITH_OCTREE)
     filter_cosine: float = _shared(FilterSettings, "filter_cosine", WITH_OCTREE)
