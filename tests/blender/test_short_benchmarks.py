@@ -15,7 +15,7 @@ from types import ModuleType
 import pytest
 from PIL import Image
 
-from benchmarks import lightwave_energy, rsm_gather, rsm_tables, second_order, technique_sheet, world_light
+from benchmarks import lightwave_energy, many_light, rsm_gather, rsm_tables, second_order, technique_sheet, world_light
 from vlm_addon.render.technique import technique_list
 
 Run = Callable[..., str]
@@ -131,6 +131,25 @@ def test_technique_sheet_has_every_technique_in_its_table_and_its_picture(
     assert [len(numbers(row[2:])) for row in rows] == [4] * len(names) + [2]
     with Image.open(target) as sheet:
         assert sheet.width >= 32 * (len(names) + 1)
+
+
+def test_many_light_has_the_published_figures_and_every_visibility(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    stages = many_light.PUBLISHED["cornell_box"].stages
+    monkeypatch.setattr(many_light, "LIGHTS", many_light.LIGHTS[:1])
+    coarse = {"none": {}, "octree": {"octree_resolution": 32}, "baked": {"visibility_cells": 8, "visibility_points": 1}}
+    visibilities = {name: {"visibility": name, **values} for name, values in coarse.items()}
+    monkeypatch.setattr(many_light, "VISIBILITIES", visibilities)
+    monkeypatch.setattr(many_light, "MANY_LIGHTS", {"few": {"lights": 16, "octree_resolution": 32, "resolution": 64}})
+    small = ("--divide", 96, "--runs", 1, "--reference-samples", 4, "--room-size", 8)
+    published, *others = tables(run(many_light, *small, "--scenes", "cornell_box", "--rooms", "cornell_box"))
+    found = {row[0]: row[1:] for row in published}
+    assert [float(found[row][1]) for name, row in many_light.PUBLISHED_STAGES.items()] == [
+        stages[name][0] for name in many_light.PUBLISHED_STAGES
+    ]
+    assert all(numbers(cells) for cells in found.values())
+    for rows, variants in zip(others, (many_light.VISIBILITIES, many_light.MANY_LIGHTS), strict=True):
+        assert [row[:2] for row in rows] == [("cornell_box", name) for name in (*variants, "noise of the reference")]
+        assert all(len(numbers(row[2:5])) == 3 for row in rows[:-1])
 
 
 @pytest.mark.parametrize("module", [rsm_gather, lightwave_energy], ids=lambda module: module.__name__)
