@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import moderngl
 
 OCTREE_BINDING, TRIANGLE_BINDING = 1, 2
-WAYS_PER_DISPATCH = 32
+WAYS_PER_DISPATCH = 16
 """For each pixel; see lib/octree.glsl."""
 
 
