@@ -3,9 +3,9 @@
 
 Sampling noise: standard deviation of the indirect light over seeds of one frame, root mean square over the pixels whose
 surface stays, relative to their mean. Of 512 lights shared by 4 x 4 pixels at 48 x 36 it is 9 to 17 % in a frame and
-12 % over the dance: a few bright pixels make that, half of all have less than 5 %. Two pictures with lights of their own
-differ by sqrt(2) times as much. With the same seed lights stay where the maps stay, so what changes from frame to frame,
-true changes counted, is 0.8 of the noise of a single picture over the dance, and 1.4 of it at the most.
+12 % over the dance: a few bright pixels make that, half of all have less than 5 %. Two pictures with lights of their
+own differ by sqrt(2) times as much. With the same seed lights stay where the maps stay, so what changes from frame to
+frame, true changes counted, is 0.8 of the noise of a single picture over the dance, and 1.4 of it at the most.
 """
 
 from __future__ import annotations
