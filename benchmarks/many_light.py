@@ -115,17 +115,15 @@ def main() -> None:
             print(f"\n{published_table(device, PUBLISHED[name], options)}", flush=True)
         header = ("indirect error", "bias", "frame ms", "once ms")
         size = f"{options.room_size} x {options.room_size} pixels"
-        visibility: list[tuple[str, ...]] = []
-        settings: list[tuple[str, ...]] = []
         for name in options.rooms:
             room = Room(device, name, options)
-            visibility += room.rows("vlm", VISIBILITIES)
+            visibility = table((name, *header), room.rows("vlm", VISIBILITIES))
+            print(f"\n`vlm` with {VIRTUAL_LIGHTS:,} lights, {size}\n{visibility}", flush=True)
             if name == options.rooms[0]:
-                settings = room.rows("many_light", MANY_LIGHTS)
-        if options.rooms:
-            text = f"`vlm` with {VIRTUAL_LIGHTS:,} lights, {size}"
-            print(f"\n{text}\n{table(('scene', 'visibility', *header), visibility)}")
-            print(f"\n`many_light`, {size}\n{table(('scene', 'settings', *header), settings)}")
+                print(
+                    f"\n`many_light`, {size}\n{table((name, *header), room.rows('many_light', MANY_LIGHTS))}",
+                    flush=True,
+                )
     print(f"load at the end {os.getloadavg()[0]:.1f}")
 
 
@@ -151,10 +149,11 @@ class ProcessorTimer(PassTimer):
 def published_table(device: Device, published: Published, options: argparse.Namespace) -> str:
     """One scene of table 5.1: a row for each stage, ours and the published figure at each number of lights."""
     scene = published.opened()
-    size = tuple(max(round(side / options.divide), 1) for side in published.size)
+    width, height = (max(round(side / options.divide), 1) for side in published.size)
+    size = width, height
     truth = reference_of(*size, options.reference_samples)
     columns, moving = [], 0.0
-    anew = Anew(device, scene, (size[0], size[1]), published.resolution)
+    anew = Anew(device, scene, size, published.resolution)
     for lights in LIGHTS:
         exact = anew.best({"lights": lights}, options.runs)
         voxels = anew.best({"lights": lights, "exact_reach": 0}, options.runs)
@@ -229,7 +228,7 @@ class Anew:
             replace(mesh, reflectance=nudged(mesh.reflectance, factor)) if changes(mesh) else mesh
             for mesh in self._scene.meshes
         ]
-        lamps = [replace(lamp, power=tuple(factor * power for power in lamp.power)) for lamp in self._scene.lights]
+        lamps = [replace(lamp, power=scaled(lamp.power, factor)) for lamp in self._scene.lights]
         scene = replace(self._scene, meshes=tuple(meshes), lights=tuple(lamps))
         before = sum(self._device.kept.built.get(f"{kind}_octree", 0) for kind in ("static", "dynamic"))
         chosen = {"octree_resolution": self._resolution, **values}
@@ -241,6 +240,12 @@ class Anew:
         return frame
 
 
+def scaled(power: tuple[float, float, float], factor: float) -> tuple[float, float, float]:
+    """Another power."""
+    red, green, blue = power
+    return factor * red, factor * green, factor * blue
+
+
 def nudged(reflectance: Float32, factor: float) -> Float32:
     """Other values that look the same."""
     return (factor * reflectance).astype(np.float32)
@@ -250,7 +255,7 @@ class Room:
     """A scene of the other tables with its virtual lights, and Cycles' picture of it."""
 
     def __init__(self, device: Device, name: str, options: argparse.Namespace) -> None:
-        self._device, self._name, self._options = device, name, options
+        self._device, self._options = device, options
         self._scene = open_sample(name).snapshot
         shapes = create_light_mesh(self._scene.meshes, SimplifySettings(target_triangles=ROOMS[name])).light_mesh
         self._light_mesh = subdivide_light_mesh(shapes, VIRTUAL_LIGHTS)
@@ -258,9 +263,11 @@ class Room:
 
     def rows(self, technique: str, variants: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, ...]]:
         """A line for each of the settings."""
-        rows = [(self._name, label, *self._measured(technique, values)) for label, values in variants.items()]
+        rows: list[tuple[str, ...]] = [
+            (label, *self._measured(technique, values)) for label, values in variants.items()
+        ]
         if self._truth is not None:
-            rows.append((self._name, "noise of the reference", f"{self._truth.noise['indirect']:.1%}", "", "", ""))
+            rows.append(("noise of the reference", f"{self._truth.noise['indirect']:.1%}", "", "", ""))
         return rows
 
     def _measured(self, technique: str, values: Mapping[str, Any]) -> tuple[str, str, str, str]:
