@@ -124,7 +124,7 @@ def main() -> None:
                     f"\n`many_light`, {size}\n{table((name, *header), room.rows('many_light', MANY_LIGHTS))}",
                     flush=True,
                 )
-    print(f"load at the end {os.getloadavg()[0]:.1f}")
+    print(f"\nload at the end {os.getloadavg()[0]:.1f}")
 
 
 class ProcessorTimer(PassTimer):
