@@ -25,12 +25,15 @@ uniform uint words_per_row;
 uniform uint first_pair;
 uniform uint end_pair;
 
-// Most ways are clear of voxels, and what they pass nearer than a voxel to their ends is smaller than a row: triangles are
-// asked where voxels block, unless all are to be exact.
+// Most ways are clear of voxels between their ends: triangles are asked all along the others alone.
 bool see(Facet from, Facet to) {
     vec3 place = from.place.xyz, normal = from.normal.xyz, other_place = to.place.xyz, other_normal = to.normal.xyz;
-    bool is_clear = EXACT_REACH < OCTREE_ALL_EXACT && octree_surfaces_see(place, normal, other_place, other_normal);
-    return is_clear || octree_points_see(place, normal, other_place, other_normal, EXACT_REACH);
+#if NEAR_REACH
+    if (octree_points_see(place, normal, other_place, other_normal, NEAR_REACH)) {
+        return true;
+    }
+#endif
+    return octree_points_see(place, normal, other_place, other_normal, OCTREE_ALL_EXACT);
 }
 
 void main() {

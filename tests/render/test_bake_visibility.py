@@ -13,7 +13,6 @@ from tests.core.visible_room import are_open, block_room, exact_shares, surface_
 from tests.render.closed_rooms import inward_box
 from tests.render.rooms import camera_at, quad
 from vlm_addon.core.baked_visibility import FULL, UNFACED, BakedVisibility, make_baked, row_weights
-from vlm_addon.core.brick_triangles import ALL_EXACT
 from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
 from vlm_addon.core.occluders import Occlusion
@@ -68,7 +67,7 @@ def baked(device: Device, lights: VirtualLightMesh) -> tuple[VisibilityRows, np.
     room = block_room()
     with device.current() as context:
         octree = scene_octree(context, device.shaders, device.kept, room, 8 * CELLS)
-        render = BakeVisibilityPass(context, device.shaders, ALL_EXACT)
+        render = BakeVisibilityPass(context, device.shaders, near_reach=0)
         air = make_cells(octree.trees[0].read().voxels(), octree.frame.resolution)
         rows = make_rows(room, octree.frame, air, 4, partial(render.are_open, octree=octree))
         shares = render.bake(rows, lights.samples, octree, silent)

@@ -24,7 +24,6 @@ from ...core.scene import Float64
 from ...core.visibility_cells import Bools
 from ...core.visibility_rows import VisibilityRows
 from ..buffer_pool import BufferPool
-from ..octree_settings import OctreeSettings
 from ..prefix_sum import INVOCATIONS, run_for_each
 from ..scene_octree import SceneOctree
 from ..shader_library import ShaderLibrary, set_uniforms
@@ -34,8 +33,8 @@ if TYPE_CHECKING:
 
 # About a second on two cores without a GPU, so that a cancellation is heard; less than a millisecond with one.
 RAYS_PER_DISPATCH = 1 << 18
-EXACT_REACH = OctreeSettings().exact_reach
-"""Voxels near the ends of ways where triangles are asked if voxels block: as without a bake."""
+NEAR_REACH = 2
+"""Voxels near the ends of a way where triangles are asked at first; all along it where that finds it blocked."""
 BAKED_DEFINES: dict[str, int | float | bool | str] = {
     "BAKED_WEIGHT_STEPS": f"{WEIGHT_STEPS}u",
     "BAKED_WEIGHT_BITS": f"{WEIGHT_STEPS.bit_length()}u",
@@ -68,11 +67,11 @@ _OPEN_BINDINGS = {
 class BakeVisibilityPass:
     """Casts the rays; everything in the voxel coordinates of one octree."""
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, exact_reach: int = EXACT_REACH) -> None:
-        """exact_reach: as in lib/octree_triangles.glsl; below ALL_EXACT, ways that are clear of voxels are open."""
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, near_reach: int = NEAR_REACH) -> None:
+        """near_reach: 0 asks triangles all along every way."""
         self._context = context
         self._pool = BufferPool(context)
-        defines = {**_BINDINGS, **BAKED_DEFINES, "GROUP_SIZE": INVOCATIONS, "EXACT_REACH": exact_reach}
+        defines = {**_BINDINGS, **BAKED_DEFINES, "GROUP_SIZE": INVOCATIONS, "NEAR_REACH": near_reach}
         self._shader = shaders.compute("passes/bake_visibility.comp", defines)
         self._open = shaders.compute("passes/bake_open.comp", {**_OPEN_BINDINGS, "GROUP_SIZE": INVOCATIONS})
 
