@@ -65,9 +65,7 @@ VISIBILITIES: dict[str, dict[str, Any]] = {
     "octree, not filtered": {**OCTREE, "filter": "none"},
     "baked, 8 cells": {**BAKED, "visibility_cells": 8},
     "baked, 16 cells (default)": BAKED,
-    "baked, 32 cells": {**BAKED, "visibility_cells": 32},
     "baked, 2 points": {**BAKED, "visibility_points": 2},
-    "baked, 32 points": {**BAKED, "visibility_points": 32},
 }
 FEW = {"lights": 512}
 MANY_LIGHTS: dict[str, dict[str, Any]] = {
