@@ -142,9 +142,9 @@ class ManyLight(Technique):
     stops it: shadows are wider by up to that. Transparent surfaces cast them whole. Lights that bring too little are
     left out (least_share). With interleaving, what few lights miss shows as grain that the filter smooths, and small
     things that its thresholds take for their surroundings are smoothed with them. Light of glowing surfaces does not
-    bounce, surfaces reflect on their counter-clockwise side only, and a lamp that casts no shadow still bounces off the
-    nearest surface alone. Light that leaves a surface by its specular layer does not bounce. Lights of later bounces know
-    a triangle's mean colour and its own normal.
+    bounce, nor does light that leaves a surface by its specular layer; surfaces reflect on their counter-clockwise side
+    only, and a lamp that casts no shadow still bounces off the nearest surface alone. Lights of later bounces know a
+    triangle's mean colour and its own normal.
     """
 
     name = "many_light"
