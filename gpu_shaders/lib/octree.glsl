@@ -141,16 +141,6 @@ bool octree_clear(vec3 start, vec3 end) {
     return true;
 }
 
-// Whether the voxel of a point in voxel coordinates is occupied. Where this is so of the beginning of a way, a third
-// surface lies within a voxel of it and every way from there is blocked: what a neighbour sees is the better answer.
-bool octree_occupied(vec3 place) {
-    bool occupied = false;
-    for (uint tree = 0u; tree < octree_words[0]; ++tree) {
-        occupied = occupied || octree_box(tree, octree_cell(place)).occupied;
-    }
-    return occupied;
-}
-
 // How many voxels along its unit normal a point has to be over a plane for its own voxel not to touch the plane: the
 // extent of a voxel along the normal. 0 for no normal.
 float octree_reach(vec3 normal) {

@@ -19,6 +19,7 @@ uniform uint first, end;    // run of a tile's lights
 uniform float gain;         // a tile's lights stand for all
 uniform float least;        // W/m², mean of the channels: a light that brings less is left out
 #if IS_OCCLUDED
+layout(std430, binding = CUT_BINDING) buffer Cut { uint cut; }; // loops that ended before their time
 uniform vec4 octree_frame;
 uniform int exact_reach;    // voxels
 #endif
@@ -37,8 +38,10 @@ void main() {
     vec3 place = octree_place(p, octree_frame);
 #endif
     vec4 sum = vec4(0.0);
+    uint done = 0u;
     for (uint i = start + first; i < start + end; ++i) {
         VirtualPointLight light = lights[i];
+        ++done;
         vec3 brought = gain * piece_geometry(p, n, light.position, light.normal, light.area) * light.flux;
         vec3 towards = light.position - p;
         bool faces = dot(towards, facet) > 0.0 && dot(towards, light.geometric_normal) < 0.0;
@@ -54,5 +57,10 @@ void main() {
 #endif
         sum.rgb += brought;
     }
+#if IS_OCCLUDED
+    if (done < end - first) {
+        atomicAdd(cut, 1u);
+    }
+#endif
     imageStore(irradiance, pixel, imageLoad(irradiance, pixel) + sum);
 }

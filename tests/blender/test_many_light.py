@@ -18,7 +18,7 @@ from vlm_addon.render.device import Device  # noqa: E402
 from vlm_addon.render.frame_types import RenderSettings  # noqa: E402
 
 CORNELL_BOX = Path(__file__).resolve().parents[2] / "sample_blends" / "cornell_box.blend"
-SMALL = (40, 2400)
+SMALL = (64, 2200)
 LARGE = (128, 3072)
 """Pixels along a side, and Cycles' samples."""
 TOTAL, INTERLEAVED, WHOLE, FLIP = 0.08, 0.20, 0.12, 0.06

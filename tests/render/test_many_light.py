@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from tests.render.closed_rooms import empty_room, inward_box
-from tests.render.rooms import box_room, camera_at
+from tests.render.rooms import box_room, camera_at, quad, split
 from tests.render.test_rsm_gather import LAMPS, MIDDLE
+from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.scene import SPOT, Light, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
@@ -159,3 +160,57 @@ def test_lamps_that_cast_no_shadow_are_named(device: Device) -> None:
     (lamp,) = box_room().lights
     frame = rendered(device, replace(box_room(), lights=(replace(lamp, casts_shadow=False),)))
     assert any("lamp" in reason for reason in frame.reasons)
+
+
+def finely_split(scene: SceneSnapshot, times: int) -> SceneSnapshot:
+    """The same surfaces of 4^times as many triangles, in the middle of a floor of 400 m that nothing lights."""
+    meshes = []
+    for mesh in scene.meshes:
+        corners = split(mesh.positions[mesh.triangles], times)
+        count = len(corners)
+        meshes.append(
+            replace(
+                mesh,
+                positions=corners.reshape(-1, 3),
+                triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+                corner_normals=np.tile(mesh.corner_normals[:1], (count, 1, 1)),
+                corner_uvs=np.zeros((count, 3, 2), np.float32),
+                corner_colors=np.zeros((0, 3, 3), np.float32),
+                material_indices=np.full(count, mesh.material_indices[0], np.int32),
+                tag_ids=np.zeros(count, np.int32),
+                reflectance=np.zeros((count, 3), np.float32),
+                emission=np.zeros((count, 3), np.float32),
+            )
+        )
+    return replace(scene, meshes=(*meshes, quad((-200.0, -200.0, -50.0), (400.0, 0.0, 0.0), (0.0, 400.0, 0.0))))
+
+
+def test_a_dense_room_in_a_wide_scene_keeps_its_light(device: Device) -> None:
+    """98,304 triangles would share a few voxels of 6 m: rays that ask for all of them end before their time."""
+    room = empty_room([MIDDLE])
+    alone = rendered(device, room, lights=256)
+    wide = rendered(device, finely_split(room, 6), lights=256)
+    assert any("octree" in reason for reason in wide.reasons)
+    assert not any("cut off" in reason for reason in wide.reasons)
+    assert wide.images["irradiance"].mean() == pytest.approx(alone.images["irradiance"].mean(), rel=0.03)
+
+
+def test_a_reflectance_that_is_no_number_is_named(device: Device) -> None:
+    room = empty_room([MIDDLE])
+    broken = replace(room.meshes[2], reflectance=np.full((2, 3), np.nan, np.float32))
+    with pytest.raises(InvalidInput, match="wall 1 False"):
+        rendered(device, replace(room, meshes=(*room.meshes[:2], broken)))
+
+
+def test_meshes_without_triangles_are_an_empty_scene(device: Device) -> None:
+    wall = empty_room([]).meshes[0]
+    empty = replace(
+        wall,
+        triangles=wall.triangles[:0],
+        **{
+            name: getattr(wall, name)[:0]
+            for name in ("corner_normals", "corner_uvs", "material_indices", "tag_ids", "reflectance", "emission")
+        },
+    )
+    frame = rendered(device, replace(empty_room([MIDDLE]), meshes=(empty,)))
+    assert not frame.images["irradiance"].any()

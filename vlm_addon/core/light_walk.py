@@ -33,9 +33,11 @@ class SurfaceMeans:
 
 
 def surface_means(meshes: Sequence[Mesh]) -> SurfaceMeans:
-    """Area and mean diffuse reflectance of meshes."""
+    """Area and mean diffuse reflectance of meshes. Raises InvalidInput for a reflectance that is not finite."""
     area, reflected = 0.0, np.zeros(3)
     for mesh in meshes:
+        if not np.isfinite(mesh.reflectance).all():
+            raise InvalidInput(f"mesh {mesh.name!r}", "what a material of it reflects is not finite", "mend its colour")
         areas = triangle_areas(mesh.positions[mesh.triangles])
         area += float(areas.sum())
         reflected += areas @ mesh.reflectance.astype(np.float64)

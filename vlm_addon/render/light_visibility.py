@@ -23,7 +23,7 @@ from .passes.filter import FilterSettings, GeometryFilterPass
 from .passes.light_picks import LightPicks
 from .passes.pick_points import PickPointsPass
 from .passes.shadow_rays import ShadowRatioPass, ShadowRayPass, ShadowRays
-from .scene_octree import scene_octree
+from .scene_octree import finer_text, fitted_octree
 from .technique import FrameInputs, SceneInputs
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class OctreeVisibility:
         size = scene.settings.width, scene.settings.height
         self._scene, self._sum, self._chosen = scene, light_sum, settings
         with scene.timer.measure("octree"):
-            self._octree = scene_octree(context, shaders, scene.kept, scene.world, settings.octree_resolution)
+            self._octree = fitted_octree(context, shaders, scene.kept, scene.world, settings.octree_resolution)
         self._points = GpuLightPoints(context, scene.light_mesh, scene.geometry.origin)
         self._picks = LightPicks(context, *size, settings.visibility_rays)
         self._pick_points = PickPointsPass(context, shaders)
@@ -100,6 +100,11 @@ class OctreeVisibility:
     def counters(self) -> dict[str, float]:
         """Of ShadowRayPass and of the octree."""
         return {**self._rays.counters(), **self._octree.counters()}
+
+    def reasons(self) -> list[str]:
+        """Why the octree is another one than was asked for."""
+        text = finer_text(self._octree, self._chosen.octree_resolution)
+        return [text] if text else []
 
     def images(self) -> dict[str, Float32]:
         """Of the last picture: the share of the light that gets there, and the same before the filter."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.array_codec import content_hash
 from ..core.scene import Float32, Float64, Mesh, SceneSnapshot
+from ..core.voxel_fit import MOST_IN_A_VOXEL, fitting_resolution
 from ..core.voxel_frame import VoxelFrame, make_voxel_frame
 from .growing_buffer import GrowingBuffer
 from .kept import Kept
@@ -103,7 +104,7 @@ def scene_octree(
     built, keys = [], []
     for kind in _KINDS:
         meshes = [mesh for mesh in world.meshes if mesh.dynamic == (kind == "dynamic") and len(mesh.triangles)]
-        if not meshes and (kind == "dynamic" or len(world.meshes)):
+        if not meshes and (kind == "dynamic" or any(len(mesh.triangles) for mesh in world.meshes)):
             continue
         shown = [_opaque(mesh, opaque) for mesh in meshes]
         reflectance = [mesh.reflectance[rows] for mesh, rows in zip(meshes, shown, strict=True)]
@@ -126,6 +127,26 @@ def scene_octree(
         buffers = kept.get("joined_octree", " ".join(keys), lambda: builder.joined(built))
     trees, lists = zip(*built, strict=True)
     return SceneOctree(*buffers, frame, trees, lists, builder.nbytes)
+
+
+def fitted_octree(
+    context: moderngl.Context, shaders: ShaderLibrary, kept: Kept, world: SceneSnapshot, resolution: int
+) -> SceneOctree:
+    """`scene_octree` with the resolution that core.voxel_fit finds from `resolution` on. Raises as that."""
+    meshes, bounds = world.meshes, world.bounds()
+    key = content_hash([resolution, bounds, [[mesh.positions, mesh.triangles] for mesh in meshes]])
+    fitting = kept.get("octree_resolution", key, lambda: fitting_resolution(meshes, bounds, resolution))
+    return scene_octree(context, shaders, kept, world, fitting)
+
+
+def finer_text(octree: SceneOctree, resolution: int) -> str:
+    """Why the voxels are finer than the `resolution` asked for; "" if they are not."""
+    if octree.frame.resolution == resolution:
+        return ""
+    return (
+        f"the octree has {octree.frame.resolution:,} voxels along an axis in place of {resolution}: "
+        f"over {MOST_IN_A_VOXEL} triangles would share one of them"
+    )
 
 
 def _opaque(mesh: Mesh, opaque: np.ndarray) -> np.ndarray:

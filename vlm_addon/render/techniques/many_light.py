@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.array_codec import content_hash
-from ...core.halton import halton_points
 from ...core.light_walk import SurfaceMeans, bounce_counts, surface_means
 from ...core.progress import Progress, step
 from ...core.scene import Float32
@@ -28,14 +27,14 @@ from ..passes.low_resolution import PickedPixels
 from ..passes.phase_two import IrradianceImage
 from ..passes.point_lights import GROUP_SIDE, LIGHT_BINDING, PointLights
 from ..passes.rsm import LampReflections
-from ..scene_octree import SceneOctree, scene_octree
+from ..scene_octree import SceneOctree, finer_text, fitted_octree
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..technique import FrameInputs, SceneInputs, Technique
 
 if TYPE_CHECKING:
     import moderngl
 
-OCTREE_BINDING, TRIANGLE_BINDING = 1, 2
+OCTREE_BINDING, TRIANGLE_BINDING, CUT_BINDING = 1, 2, 3
 WAYS_PER_DISPATCH = 16
 """For each pixel; see lib/octree.glsl."""
 
@@ -89,7 +88,8 @@ class ManyLightPass:
         self._context = context
         self._irradiance = IrradianceImage(context, width, height)
         self._groups = -(-width // GROUP_SIDE), -(-height // GROUP_SIDE)
-        bindings = {"LIGHT_BINDING": LIGHT_BINDING, "OCTREE_BINDING": OCTREE_BINDING}
+        self._cut = context.buffer(bytes(4))
+        bindings = {"LIGHT_BINDING": LIGHT_BINDING, "OCTREE_BINDING": OCTREE_BINDING, "CUT_BINDING": CUT_BINDING}
         defines = {**bindings, "OCTREE_TRIANGLE_BINDING": TRIANGLE_BINDING, "GROUP_SIDE": GROUP_SIDE}
         self._shaders = {
             occluded: shaders.compute("techniques/many_light.comp", {**defines, "IS_OCCLUDED": occluded})
@@ -121,6 +121,7 @@ class ManyLightPass:
         if rays is not None:
             octree, frame, exact_reach = rays
             octree.bind(OCTREE_BINDING, TRIANGLE_BINDING)
+            self._cut.bind_to_storage_buffer(CUT_BINDING)
             values |= {"octree_frame": frame, "exact_reach": exact_reach}
         for bounce in lights:
             bounce.buffer.bind_to_storage_buffer(LIGHT_BINDING)
@@ -132,6 +133,10 @@ class ManyLightPass:
                 self._context.memory_barrier()
                 step(progress, end / each, "gather")
         return self._irradiance.texture
+
+    def cut_off(self) -> int:
+        """How often a software renderer ended the loop over a pixel's lights before its time, so far."""
+        return int(np.frombuffer(self._cut.read(), np.uint32)[0])
 
 
 class ManyLight(Technique):
@@ -156,7 +161,7 @@ class ManyLight(Technique):
         super().__init__(scene, settings)
         context, shaders, timer = scene.context, scene.shaders, scene.timer
         with timer.measure("octree"):
-            self._octree = scene_octree(context, shaders, scene.kept, scene.world, settings.octree_resolution)
+            self._octree = fitted_octree(context, shaders, scene.kept, scene.world, settings.octree_resolution)
         with timer.measure("reflective shadow maps"):
             self._maps = LampReflections(
                 context, shaders, scene.kept, scene.world, settings.resolution, settings.area_maps
@@ -262,12 +267,18 @@ class ManyLight(Technique):
         return {f"{self.name}_{name}": np.ascontiguousarray(image, np.float32) for name, image in found.items()}
 
     def reasons(self) -> list[str]:
-        """Which lamps' light does not bounce as they shine."""
+        """Why the octree is another one than was asked for, what is missing, and which lamps' light does not bounce as
+        they shine."""
+        found = [finer_text(self._octree, self.chosen.octree_resolution)]
+        if cut := self._gather.cut_off():
+            found.append(f"light is missing: rays were cut off {cut:,} times; use a finer octree_resolution")
         names = [light.name for light in self.scene.snapshot.lights if not light.casts_shadow]
-        return [f"{', '.join(names)}: no shadow, yet the light bounces off the nearest surfaces only"] if names else []
+        if names:
+            found.append(f"{', '.join(names)}: no shadow, yet the light bounces off the nearest surfaces only")
+        return [text for text in found if text]
 
 
 def _shift_of(seed: int) -> tuple[float, float]:
-    """By which the lights of a seed are moved around the unit square; seeds are evenly spread."""
-    x, y = halton_points(1, first=seed)[0].tolist()
+    """By which the lights of a seed are moved around the unit square: none for 0, else at random."""
+    x, y = np.random.default_rng(seed).random(2).tolist() if seed else (0.0, 0.0)
     return x, y

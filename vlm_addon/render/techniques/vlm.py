@@ -172,7 +172,7 @@ class VirtualLightMeshTechnique(Technique):
         if not occlusion.possible:
             return None, [f"no visibility rays are cast: {occlusion.reason}"]
         visibility = OctreeVisibility(self.scene, self._sum, self.chosen)
-        return visibility, [f"visibility rays are cast: {occlusion.reason}"]
+        return visibility, [f"visibility rays are cast: {occlusion.reason}", *visibility.reasons()]
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the lights of radiosity times form factor, and times what gets there."""
