@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.core.visible_room import are_open, block_room, exact_shares, surface_lights
 from tests.render.closed_rooms import inward_box
-from tests.render.rooms import camera_at, quad
+from tests.render.rooms import camera_at, quad, split
 from vlm_addon.core.baked_visibility import FULL, UNFACED, BakedVisibility, make_baked, row_weights
 from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
@@ -21,9 +22,11 @@ from vlm_addon.core.scene import DIFFUSE, POINT, Float32, Light, Material, Scene
 from vlm_addon.core.triangle_tree import build_tree
 from vlm_addon.core.visibility_cells import make_cells
 from vlm_addon.core.visibility_rows import VisibilityRows, make_rows, opaque_corners
+from vlm_addon.core.voxel_frame import make_voxel_frame
 from vlm_addon.render import scene_visibility
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
+from vlm_addon.render.kept import Kept
 from vlm_addon.render.local_space import LocalSpace
 from vlm_addon.render.passes.bake_visibility import BakeVisibilityPass
 from vlm_addon.render.passes.baked_pixels import BakedPixelsPass, GpuBakedVisibility
@@ -279,3 +282,21 @@ def test_cells_are_coarser_where_shares_would_take_too_much(
     monkeypatch.setattr(scene_visibility, "MOST_BYTES", 1_000)
     with pytest.raises(InvalidInput, match="MB are the limit"):
         own_device.render(room, lights, settings(visibility_cells=8, visibility_points=2))
+
+
+def test_cells_too_coarse_for_a_dense_mesh_are_told(device):
+    """The room in the middle of a floor of 400 m: all of it lies in a cell or two."""
+    room = block_room()
+    corners = split(np.concatenate([mesh.positions[mesh.triangles] for mesh in room.meshes]), 4)
+    count = len(corners)
+    dense = replace(
+        room.meshes[0],
+        positions=corners.reshape(-1, 3),
+        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+    )
+    far = quad((-200.0, -200.0, -50.0), (400.0, 0.0, 0.0), (0.0, 400.0, 0.0))
+    wide = replace(room, meshes=(dense, far))
+    baked = SimpleNamespace(frame=make_voxel_frame(wide.bounds(), 64))
+    assert "cells of 50" in scene_visibility.dense_text(Kept(), wide, baked)
+    near = SimpleNamespace(frame=make_voxel_frame(room.bounds(), 64))
+    assert scene_visibility.dense_text(Kept(), room, near) == ""

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.array_codec import content_hash
 from ..core.light_grid import LitTree
 from .passes.baked_pixels import BakedPixelsPass, PixelVisibility
-from .scene_visibility import CLUSTER_KIND, KIND, coarser_text, forest_shares, scene_visibility
+from .scene_visibility import CLUSTER_KIND, KIND, coarser_text, dense_text, forest_shares, scene_visibility
 from .technique import FrameInputs, SceneInputs
 
 if TYPE_CHECKING:
@@ -84,8 +84,10 @@ class BakedLights:
         }
 
     def reasons(self) -> list[str]:
-        """Why cells are coarser than asked for, and where surfaces count as seeing all."""
-        coarser = coarser_text(self._visibility.baked, self._chosen.visibility_cells)
-        bare = self._counted()[1]
-        text = f"{bare:,} pixels of samples show surfaces of which no visibility is baked: they see every light"
-        return [*([coarser] if coarser else []), *([text] if bare else [])]
+        """Why cells are coarser than asked for, or too coarse, and where surfaces count as seeing all."""
+        baked, scene = self._visibility.baked, self._scene
+        found = [coarser_text(baked, self._chosen.visibility_cells), dense_text(scene.kept, scene.world, baked)]
+        if bare := self._counted()[1]:
+            text = f"{bare:,} pixels of samples show surfaces of which no visibility is baked: they see every light"
+            found.append(text)
+        return [text for text in found if text]

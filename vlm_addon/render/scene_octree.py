@@ -132,11 +132,15 @@ def scene_octree(
 def fitted_octree(
     context: moderngl.Context, shaders: ShaderLibrary, kept: Kept, world: SceneSnapshot, resolution: int
 ) -> SceneOctree:
-    """`scene_octree` with the resolution that core.voxel_fit finds from `resolution` on. Raises as that."""
+    """`scene_octree` with the `needed_resolution`. Raises as that."""
+    return scene_octree(context, shaders, kept, world, needed_resolution(kept, world, resolution))
+
+
+def needed_resolution(kept: Kept, world: SceneSnapshot, resolution: int) -> int:
+    """What core.voxel_fit finds from `resolution` on. Raises InvalidInput as that."""
     meshes, bounds = world.meshes, world.bounds()
     key = content_hash([resolution, bounds, [[mesh.positions, mesh.triangles] for mesh in meshes]])
-    fitting = kept.get("octree_resolution", key, lambda: fitting_resolution(meshes, bounds, resolution))
-    return scene_octree(context, shaders, kept, world, fitting)
+    return kept.get("octree_resolution", key, lambda: fitting_resolution(meshes, bounds, resolution))
 
 
 def finer_text(octree: SceneOctree, resolution: int) -> str:

@@ -25,10 +25,11 @@ from ..core.progress import Progress
 from ..core.scene import SceneSnapshot
 from ..core.visibility_cells import SIDE, VisibilityCells, make_cells
 from ..core.visibility_rows import VisibilityRows, make_rows
+from ..core.voxel_fit import MOST_IN_A_VOXEL
 from .kept import Kept
 from .passes.bake_visibility import BakeVisibilityPass
 from .passes.baked_pixels import GpuBakedVisibility
-from .scene_octree import SceneOctree, scene_octree
+from .scene_octree import SceneOctree, needed_resolution, scene_octree
 from .shader_library import ShaderLibrary
 
 if TYPE_CHECKING:
@@ -117,6 +118,19 @@ def coarser_text(baked: BakedVisibility, cells: int) -> str:
     return (
         f"visibility is baked with {baked.cells_per_axis} cells along the longest axis in place of {cells}: "
         f"more would take over {1e-6 * MOST_BYTES:,.0f} MB, or over what the device's blocks hold"
+    )
+
+
+def dense_text(kept: Kept, world: SceneSnapshot, baked: BakedVisibility) -> str:
+    """Why visibility is poor where meshes are dense in a wide scene; "" if they are not."""
+    frame = baked.frame
+    if needed_resolution(kept, world, frame.resolution) == frame.resolution:
+        return ""
+    size = SIDE * frame.voxel_size
+    return (
+        f"visibility is baked for cells of {size:.3g} m, in whose voxels over {MOST_IN_A_VOXEL} triangles lie: too "
+        "coarse for these, and rays that ask so many may count as blocked; give more visibility_cells or hide what is "
+        "far away"
     )
 
 
