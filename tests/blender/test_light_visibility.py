@@ -36,8 +36,8 @@ def opened(name):
     return extract_scene()
 
 
-def errors(device, name, shape_lights, side, reference_samples, samples):
-    """Indirect relative RMSE without and with visibility, and the noise of the reference.
+def errors(device, name, shape_lights, side, reference_samples, samples, kind="octree"):
+    """Indirect relative RMSE without and with visibility of a kind, and the noise of the reference.
 
     shape_lights: that bodies are simplified to before large triangles are halved down to LIGHTS.
     """
@@ -46,7 +46,7 @@ def errors(device, name, shape_lights, side, reference_samples, samples):
     light_mesh = subdivide_light_mesh(light_mesh, LIGHTS)
     reference = render_reference(side, side, 1, reference_samples)
     found = []
-    for visibility in ("none", "octree"):
+    for visibility in ("none", kind):
         settings = RenderSettings(side, side, "vlm", {"visibility": visibility}, samples, shadow_samples=8)
         image = device.render(snapshot, light_mesh, settings).images["indirect"]
         found.append(relative_rmse(image, reference.images["indirect"]))
@@ -60,9 +60,12 @@ def test_a_small_picture_of_cornell_box_is_twice_as_near_to_cycles(device):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("name", "shape_lights"), [("cornell_box", 500), ("monkey_box", 1500)])
-def test_visibility_halves_the_error_against_cycles(device, name, shape_lights):
-    without, with_visibility, noise = errors(device, name, shape_lights, 64, 4096, 8)
+@pytest.mark.parametrize(
+    ("kind", "name", "shape_lights"),
+    [("octree", "cornell_box", 500), ("octree", "monkey_box", 1500), ("baked", "cornell_box", 500)],
+)
+def test_visibility_halves_the_error_against_cycles(device, kind, name, shape_lights):
+    without, with_visibility, noise = errors(device, name, shape_lights, 64, 4096, 8, kind)
     assert noise < 0.2 * (0.5 * without)
     assert with_visibility <= 0.5 * without
 
@@ -72,20 +75,24 @@ def white(walls):
 
 
 @pytest.mark.full
-def test_a_closed_room_in_the_atrium_stays_black(device):
-    """Of walls of 10 cm, each side of which has lights of its own."""
+@pytest.mark.parametrize(
+    ("kind", "chosen", "lights", "wall_lights"),
+    [("octree", {}, LIGHTS, 200), ("baked", {"visibility_cells": 8}, 400, 100)],
+)
+def test_a_closed_room_in_the_atrium_stays_black(device, kind, chosen, lights, wall_lights):
+    """Of walls of 10 cm, thinner than a voxel, each side of which has lights of its own."""
     atrium = opened("atrium")
     inner = white(inward_box([-1.5, -1.5, 0.1], [1.5, 1.5, 3.0], [0] * 6))
     outer = white(inward_box([-1.6, -1.6, 0.0], [1.6, 1.6, 3.1], [0] * 6, outward=True))
-    parts = [create_light_mesh(meshes, SimplifySettings(LIGHTS)).light_mesh for meshes in (atrium.meshes, inner, outer)]
-    light_mesh = join([parts[0], *(subdivide_light_mesh(part, 200) for part in parts[1:])])
+    parts = [create_light_mesh(meshes, SimplifySettings(lights)).light_mesh for meshes in (atrium.meshes, inner, outer)]
+    light_mesh = join([parts[0], *(subdivide_light_mesh(part, wall_lights) for part in parts[1:])])
     hall = replace(atrium, meshes=(*atrium.meshes, *inner, *outer))
     room = replace(hall, camera=camera_at((-1.3, -1.3, 2.0), (1.0, 1.0, 0.8), lens=18.0))
 
     def picture(scene, visibility):
-        settings = RenderSettings(48, 32, "vlm", {"visibility": visibility}, 2, shadow_samples=1)
+        settings = RenderSettings(48, 32, "vlm", {**chosen, "visibility": visibility}, 2, shadow_samples=1)
         return device.render(scene, light_mesh, settings).images["indirect"]
 
-    lit, dark = picture(hall, "octree"), picture(room, "octree")
+    lit, dark = picture(hall, kind), picture(room, kind)
     assert picture(room, "none").mean() > 0.05 * lit.mean()
     assert dark.max() <= 1e-3 * lit.mean()
