@@ -3,10 +3,10 @@
 
 from bpy.types import Operator
 
+from ..vlm_addon.bake import BakeSettings
 from ..vlm_addon.blender import authoring, availability
 from ..vlm_addon.blender.long_operator import LongOperator
 from ..vlm_addon.blender.properties import property_annotations, settings_from
-from ..vlm_addon.core.simplify import SimplifySettings
 
 
 class VLM_OT_bake(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)
@@ -15,14 +15,14 @@ class VLM_OT_bake(LongOperator, Operator):  # noqa: N801 (Blender's naming of cl
     bl_idname = "vlm.bake"
     bl_label = "Bake"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
-    __annotations__ = property_annotations(SimplifySettings)
+    __annotations__ = property_annotations(BakeSettings)
 
     @classmethod
     def poll(cls, context):
         return authoring.allow(cls, availability.visible_scene_problem(context))
 
     def prepare(self, context):
-        return authoring.from_visible_scene(context, settings_from(self, SimplifySettings))
+        return authoring.from_visible_scene(context, settings_from(self, BakeSettings))
 
     def finish(self, context, result):
         findings = len(result.bake.findings)

@@ -3,15 +3,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from .core.errors import InvalidInput
 from .core.light_mesh import VirtualLightMesh, require_valid
 from .core.progress import Progress, silent
 from .core.scene import Finding, SceneSnapshot
-from .core.simplify import SimplifyReport, SimplifySettings, create_light_mesh
+from .core.settings import OWN, setting
+from .core.simplify import SimplifyReport, SimplifySettings, create_light_mesh, subdivide_light_mesh
 from .core.validate import check_light_mesh
+
+
+@dataclass(frozen=True)
+class BakeSettings(SimplifySettings):
+    """How many lights there are, and how they are shared between shape and size."""
+
+    split_share: float = setting(
+        0.0,
+        "share",
+        0.0,
+        0.9,
+        "Of the lights, how many are spent on halving the largest: simplification keeps a flat wall as two lights, and "
+        "light on it is then even all over",
+        source=OWN,
+    )
+
+    @property
+    def shape_lights(self) -> int:
+        """Lights that surfaces are simplified to before large ones are halved."""
+        return max(round(self.target_triangles * (1.0 - self.split_share)), 1)
 
 
 @dataclass(frozen=True)
@@ -50,7 +71,7 @@ class Bake:
 def bake(
     snapshot: SceneSnapshot,
     existing: VirtualLightMesh | None,
-    settings: SimplifySettings | None = None,
+    settings: BakeSettings | None = None,
     progress: Progress = silent,
 ) -> Bake:
     """The light mesh of a scene: `existing` where there is one and no `settings` ask for another, else a new one.
@@ -66,8 +87,11 @@ def bake(
         if not snapshot.triangle_count:
             problem = "no visible object in it has a surface"
             raise InvalidInput(f"scene {snapshot.name!r}", problem, "add a mesh or enable one in renders")
-        created = create_light_mesh(snapshot.meshes, settings or SimplifySettings(), progress)
+        chosen = settings or BakeSettings()
+        created = create_light_mesh(snapshot.meshes, replace(chosen, target_triangles=chosen.shape_lights), progress)
         light_mesh, creation = created.light_mesh, created.report
+        if chosen.split_share > 0.0:
+            light_mesh = subdivide_light_mesh(light_mesh, chosen.target_triangles, chosen.samples_per_light)
     findings = check_light_mesh(light_mesh, snapshot.meshes)
     made = creation.findings if creation is not None else ()
     return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings))

@@ -73,6 +73,8 @@ def _add_bake(commands: argparse._SubParsersAction[_Parser]) -> None:
     command = _command(commands, "bake", text, "vlm bake hall.blend --triangles 2000 --save hall_vlm.blend")
     _scene_options(command)
     command.add_argument("--triangles", type=int, metavar="N", help="virtual lights to make; replaces generated ones")
+    split_help = "of those, the share spent on halving the largest lights, so that walls are not two lights each (0)"
+    command.add_argument("--split", type=float, metavar="SHARE", help=split_help)
     command.add_argument("--grid", type=int, metavar="N", help="cells along each side of the light grid, with --range")
     mode = command.add_mutually_exclusive_group()
     tolerance_help = (

@@ -70,6 +70,18 @@ def test_baking_again_with_another_budget_replaces_what_was_made(lit_room, tmp_p
     assert len(extract().light_mesh) <= 4
 
 
+def test_a_share_of_the_lights_halves_large_ones(lit_room, tmp_path, capsys):
+    report = tmp_path / "report.json"
+    assert run(capsys, "bake", lit_room, "--triangles", 40, "--split", 0.5, "--json", report)[0] == 0
+    assert json.loads(report.read_text())["lights"] == 40
+    code, errors = run(capsys, "bake", lit_room, "--split", 0.5, "--json", report)
+    assert code == 2
+    assert "--triangles" in errors[0]
+    code, errors = run(capsys, "bake", lit_room, "--triangles", 40, "--split", 1.5, "--json", report)
+    assert code == 2
+    assert "split_share" in errors[0]
+
+
 def test_a_light_mesh_drawn_by_hand_is_kept(tmp_path, capsys):
     cornell, report = ROOT / "sample_blends" / "cornell_box.blend", tmp_path / "report.json"
     assert run(capsys, "bake", cornell, "--triangles", 9, "--json", report)[0] == 0

@@ -13,6 +13,7 @@ bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 from tests.render.closed_rooms import inward_box  # noqa: E402
 from tests.render.rooms import camera_at  # noqa: E402
+from vlm_addon.bake import BakeSettings, bake  # noqa: E402
 from vlm_addon.blender.cycles_reference import render_reference  # noqa: E402
 from vlm_addon.blender.extract import extract_scene  # noqa: E402
 from vlm_addon.core.light_mesh import join  # noqa: E402
@@ -22,7 +23,7 @@ from vlm_addon.render.device import Device  # noqa: E402
 from vlm_addon.render.frame_types import RenderSettings  # noqa: E402
 
 FOLDER = Path(__file__).resolve().parents[2] / "sample_blends"
-LIGHTS = 2000
+LIGHTS, SPLIT_SHARE = 2000, 0.25
 
 
 @pytest.fixture(scope="module")
@@ -36,14 +37,14 @@ def opened(name):
     return extract_scene()
 
 
-def errors(device, name, shape_lights, side, reference_samples, samples, kind="octree"):
+def errors(device, name, side, reference_samples, samples, kind="octree"):
     """Indirect relative RMSE without and with visibility of a kind, and the noise of the reference.
 
-    shape_lights: that bodies are simplified to before large triangles are halved down to LIGHTS.
+    Of as many LIGHTS as `bake --triangles --split` makes of the scene.
     """
     snapshot = opened(name)
-    light_mesh = create_light_mesh(snapshot.meshes, SimplifySettings(target_triangles=shape_lights)).light_mesh
-    light_mesh = subdivide_light_mesh(light_mesh, LIGHTS)
+    light_mesh = bake(snapshot, None, BakeSettings(LIGHTS, split_share=SPLIT_SHARE)).light_mesh
+    assert len(light_mesh) == LIGHTS
     reference = render_reference(side, side, 1, reference_samples)
     found = []
     for visibility in ("none", kind):
@@ -55,17 +56,16 @@ def errors(device, name, shape_lights, side, reference_samples, samples, kind="o
 
 def test_a_small_picture_of_cornell_box_is_twice_as_near_to_cycles(device):
     # What noise the reference has is in both errors, and more of the smaller one.
-    without, with_visibility, _ = errors(device, "cornell_box", 500, 24, 1536, 4)
+    without, with_visibility, _ = errors(device, "cornell_box", 24, 1536, 4)
     assert with_visibility <= 0.5 * without
 
 
 @pytest.mark.full
 @pytest.mark.parametrize(
-    ("kind", "name", "shape_lights"),
-    [("octree", "cornell_box", 500), ("octree", "monkey_box", 1500), ("baked", "cornell_box", 500)],
+    ("kind", "name"), [("octree", "cornell_box"), ("octree", "monkey_box"), ("baked", "cornell_box")]
 )
-def test_visibility_halves_the_error_against_cycles(device, kind, name, shape_lights):
-    without, with_visibility, noise = errors(device, name, shape_lights, 64, 4096, 8, kind)
+def test_visibility_halves_the_error_against_cycles(device, kind, name):
+    without, with_visibility, noise = errors(device, name, 64, 4096, 8, kind)
     assert noise < 0.2 * (0.5 * without)
     assert with_visibility <= 0.5 * without
 

@@ -9,11 +9,10 @@ from typing import Any
 
 import bpy
 
-from ..bake import Bake, bake
+from ..bake import Bake, BakeSettings, bake
 from ..core.errors import InvalidInput, VlmError
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
-from ..core.simplify import SimplifySettings
 from ..light_grid_bake import check_lights
 from .availability import has_geometry, light_mesh_objects, rendered_objects
 from .engine import ENGINE_ID
@@ -39,7 +38,7 @@ class Made:
     sources: tuple[str, ...] = ()
 
 
-def from_selection(context: Any, settings: SimplifySettings) -> Callable[[Progress], Made]:
+def from_selection(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the selected objects."""
     sources = tuple(thing.name for thing in context.selected_objects if has_geometry(thing))
     snapshot = extract_scene(ExtractOptions(objects=frozenset(sources)))
@@ -48,12 +47,12 @@ def from_selection(context: Any, settings: SimplifySettings) -> Callable[[Progre
     return _work(snapshot, f"{NAME} {named_after}", sources, settings)
 
 
-def from_visible_scene(context: Any, settings: SimplifySettings) -> Callable[[Progress], Made]:
+def from_visible_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the visible scene where it has none, and checks the one it has."""
     return _work_on_scene(context, extract(), settings)
 
 
-def from_lit_scene(context: Any, settings: SimplifySettings) -> Callable[[Progress], Made]:
+def from_lit_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
     """The same for a scene that is about to be rendered. Raises InvalidInput where nothing in it sends out light."""
     found = extract()
     require_camera(found.snapshot)
@@ -61,7 +60,7 @@ def from_lit_scene(context: Any, settings: SimplifySettings) -> Callable[[Progre
     return _work_on_scene(context, found, settings)
 
 
-def _work_on_scene(context: Any, found: Extraction, settings: SimplifySettings) -> Callable[[Progress], Made]:
+def _work_on_scene(context: Any, found: Extraction, settings: BakeSettings) -> Callable[[Progress], Made]:
     snapshot, existing = found.snapshot, found.light_mesh
     if existing is None:
         sources = tuple(thing.name for thing in rendered_objects(context) if has_geometry(thing))
@@ -70,7 +69,7 @@ def _work_on_scene(context: Any, found: Extraction, settings: SimplifySettings) 
 
 
 def _work(
-    snapshot: SceneSnapshot, name: str, sources: tuple[str, ...], settings: SimplifySettings
+    snapshot: SceneSnapshot, name: str, sources: tuple[str, ...], settings: BakeSettings
 ) -> Callable[[Progress], Made]:
     return lambda progress: Made(bake(snapshot, None, settings, progress), snapshot.name, name, sources)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import bpy
 
-from ..bake import Bake, bake
+from ..bake import Bake, BakeSettings, bake
 from ..core.errors import InvalidInput
 from ..core.light_grid_export import SUFFIX as FIXED_SIZE_SUFFIX
 from ..core.light_grid_export import save_fixed_size_lists
@@ -20,7 +20,6 @@ from ..core.light_grid_file import save_light_grid
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..core.settings import describe, from_mapping
-from ..core.simplify import SimplifySettings
 from ..core.whole_file import atomic_output
 from ..light_grid_bake import GridBake, bake_light_grid, check_lights
 from ..render.frame_types import Frame, RenderSettings, require_in_range
@@ -46,7 +45,7 @@ def bake_command(arguments: Namespace) -> None:
     if not outputs:
         remedy = "name --save OUT.blend, --light-grid OUT.vlmgrid or --json REPORT.json"
         raise InvalidInput("bake", "nothing would be written", remedy)
-    settings = _simplify_settings(arguments.triangles)
+    settings = _bake_settings(arguments.triangles, arguments.split)
     _require_apart(arguments.scene, outputs)
     require_room_for_visibility(arguments)
     opened, found = _open(arguments)
@@ -101,12 +100,15 @@ def _grid(snapshot: SceneSnapshot, arguments: Namespace) -> GridBake | None:
     return None if light_mesh is None else bake_light_grid(snapshot, light_mesh, settings, TerminalProgress())
 
 
-def _simplify_settings(triangles: int | None) -> SimplifySettings | None:
+def _bake_settings(triangles: int | None, split: float | None) -> BakeSettings | None:
     if triangles is None:
+        if split is not None:
+            raise InvalidInput("--split", f"{split} of how many lights is not said", "give --triangles, too")
         return None
     if triangles < 1:
         raise InvalidInput("--triangles", f"{triangles} lights cannot be made", "ask for at least 1")
-    return from_mapping(SimplifySettings, {"target_triangles": triangles}, "bake")
+    values = {"target_triangles": triangles, "split_share": split or 0.0}
+    return from_mapping(BakeSettings, values, "bake")
 
 
 def _require_visible_light_meshes(found: Extraction) -> None:
