@@ -106,6 +106,15 @@ float ggx_lobe(float cos_half, float cos_light, float cos_view, float alpha) {
     return distribution * cos_light * 0.5 / max(view_part + light_part, 1e-20);
 }
 
+// What the specular lobe reflects of light whose half vector stands at cos_vh to the view; times the GGX lobe.
+vec3 lobe_fresnel(Reflector reflector, float cos_vh) {
+    float grazing = 1.0 - cos_vh;
+    float grazing_squared = grazing * grazing;
+    vec3 metal = reflector.metal_f0 + (1.0 - reflector.metal_f0) * (grazing_squared * grazing_squared * grazing);
+    float dielectric = reflector.dielectric_weight * fresnel_dielectric(cos_vh, reflector.ior);
+    return reflector.metal_weight * metal + dielectric;
+}
+
 // Specular BRDF times the cosine of the light, 1/sr. normal, to_light, to_view: unit.
 vec3 specular_reflection(Reflector reflector, vec3 normal, vec3 to_light, vec3 to_view) {
     float cos_light = dot(normal, to_light), cos_view = dot(normal, to_view);
@@ -116,10 +125,6 @@ vec3 specular_reflection(Reflector reflector, vec3 normal, vec3 to_light, vec3 t
     half_vector *= inversesqrt(max(dot(half_vector, half_vector), 1e-30));
     float cos_vh = clamp(dot(to_view, half_vector), 0.0, 1.0);
     float lobe = ggx_lobe(clamp(dot(normal, half_vector), 0.0, 1.0), cos_light, cos_view, reflector.alpha);
-    float grazing = 1.0 - cos_vh;
-    float grazing_squared = grazing * grazing;
-    vec3 metal = reflector.metal_f0 + (1.0 - reflector.metal_f0) * (grazing_squared * grazing_squared * grazing);
-    float dielectric = reflector.dielectric_weight * fresnel_dielectric(cos_vh, reflector.ior);
-    return lobe * (reflector.metal_weight * metal + dielectric);
+    return lobe * lobe_fresnel(reflector, cos_vh);
 }
 #endif

@@ -224,3 +224,14 @@ def test_wider_light_blurs_the_lobe_and_mirrorless_surfaces_stay_so(device: Devi
     assert (np.diff(widened) > 0.0).all()
     assert widened[-1] <= 1.0
     assert not call(device, "widened_alpha(alpha, angle)", {"alpha": np.zeros(4), "angle": angles}, 1).any()
+
+
+def test_lobe_fresnel_mixes_a_metal_and_a_dielectric(device: Device) -> None:
+    """With known weights: Schlick's metal of F0 0.3, and the interface of each index."""
+    iors, cosines = of_all(IORS, COSINES)
+    reflector = "Reflector(vec3(0.0), vec3(0.3), vec3(0.25), 0.75, ior, 0.1)"
+    found = function(device, f"lobe_fresnel({reflector}, cosine).x", ior=IORS, cosine=COSINES)
+    metal = 0.3 + 0.7 * (1.0 - cosines) ** 5
+    decided = np.abs(iors * iors - 1.0 + cosines * cosines) > 1e-5
+    expected = 0.25 * metal + 0.75 * brdf.fresnel_dielectric(cosines, iors)
+    np.testing.assert_allclose(found[decided], expected[decided], rtol=2e-4, atol=1e-6)
