@@ -12,10 +12,11 @@ import pytest
 
 from tests.render.closed_rooms import empty_room, inward_box
 from tests.render.rooms import camera_at, quad
+from vlm_addon.core.reach import in_reach
 from vlm_addon.core.scene import AREA, DIFFUSE, POINT, SPOT, SUN, Light, Material, Mesh, SceneSnapshot, Texture
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.lamp_scenes import LampScenes, in_reach
+from vlm_addon.render.lamp_scenes import LampScenes
 
 DOWN = {"spot_angle": 0.8, "spot_blend": 0.2}
 LEFT = Light("left", SPOT, (30.0, 30.0, 30.0), (-3.0, 0.0, 2.0), **DOWN)

@@ -36,6 +36,8 @@ LEAST_SPOT_SCALE = 1e-6
 # The same for float64: there the exact form has lost as much, 1e-7 of the sine.
 _FLAT_CONE = 1e-3
 _ELLIPSE_CELLS = 64
+# Half the angle of a sun at most, radians: wider ones shine from half of all directions.
+_WIDEST_SUN = math.radians(89.0)
 _CELL_CORNERS = 8
 # Steps of the bisection that inverts the radius of a lamp's ball: one for each bit of a float64.
 _BISECTIONS = 53
@@ -79,6 +81,18 @@ def lamp_samples(light: Light, count: int, together: int = 1) -> tuple[LampSampl
     """
     samples = _samples_in_rows(light, count)
     return samples if len(samples) == 1 else tuple(samples[i] for i in _order(count, together))
+
+
+def lamp_hull(light: Light) -> Float64:
+    """(k, 3) points that have every point of the lamp between them, m in world space; for a SUN directions towards it
+    likewise, not unit."""
+    axes = np.array([light.x_axis, light.y_axis, light.z_axis])
+    signs = np.array(list(np.ndindex(2, 2, 2))) * 2.0 - 1.0
+    if light.kind == SUN:
+        half = math.tan(min(0.5 * light.angle, _WIDEST_SUN)) if is_soft(light) else 0.0
+        return np.asarray((signs[::2] * (half, half, 0.0) + (0.0, 0.0, 1.0)) @ axes)
+    half_size = (0.5 * light.size_x, 0.5 * light.size_y, 0.0) if light.kind == AREA else (light.radius,) * 3
+    return np.asarray(np.array(light.position) + (signs * half_size) @ axes)
 
 
 def _samples_in_rows(light: Light, count: int) -> tuple[LampSample, ...]:

@@ -26,8 +26,11 @@ class Occlusion:
     reason: str
 
 
-def find_occlusion(meshes: Sequence[Mesh], source_points: Float64 | None = None) -> Occlusion:
-    """Whether something of `meshes` may stand between two points of them, or between one and `source_points` (s, 3).
+def find_occlusion(
+    meshes: Sequence[Mesh], source_points: Float64 | None = None, source_directions: Float64 | None = None
+) -> Occlusion:
+    """Whether something of `meshes` may stand between two points of them, or between one and `source_points` (s, 3) or
+    what lies infinitely far in `source_directions` (d, 3).
 
     Not so where every triangle has all points on one side of its plane, or in it: then all triangles are on the hull of
     the scene, and a segment between two points of a convex body does not leave it. That is a room without anything
@@ -41,6 +44,7 @@ def find_occlusion(meshes: Sequence[Mesh], source_points: Float64 | None = None)
     if source_points is not None:
         points = np.concatenate([points, source_points])
     points = np.unique(points, axis=0)
+    directions = np.zeros((0, 3)) if source_directions is None else source_directions
     slack = _SLACK * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     left, at_once = MOST_PAIRS, max(_AT_ONCE // len(points), 1)
     for mesh in filled:
@@ -48,15 +52,16 @@ def find_occlusion(meshes: Sequence[Mesh], source_points: Float64 | None = None)
         for first in range(0, len(corners), at_once):
             if left <= 0:
                 return Occlusion(True, f"{triangle_count:,} triangles may occlude each other: too many to compare all")
-            if not _have_all_on_one_side(corners[first : first + at_once], points, slack):
+            if not _have_all_on_one_side(corners[first : first + at_once], points, directions, slack):
                 return Occlusion(True, f"{mesh.name!r} has other surfaces on both sides and may stand between them")
             left -= at_once * len(points)
     text = f"each of the {triangle_count:,} triangles has the whole scene on one side"
     return Occlusion(False, f"nothing can occlude anything: {text}")
 
 
-def _have_all_on_one_side(corners: Float64, points: Float64, slack: float) -> bool:
-    """Whether each of (t, 3, 3) triangles has all of (p, 3) points on one side of its plane, within `slack` of it.
+def _have_all_on_one_side(corners: Float64, points: Float64, directions: Float64, slack: float) -> bool:
+    """Whether each of (t, 3, 3) triangles has all of (p, 3) points, and all that lies far in (d, 3) directions, on one
+    side of its plane, the points within `slack` of it.
 
     Triangles without area occlude nothing. False for what is not finite.
     """
@@ -68,5 +73,8 @@ def _have_all_on_one_side(corners: Float64, points: Float64, slack: float) -> bo
     solid = lengths > 0.0
     normals, a = normals[solid] / lengths[solid, None], a[solid]
     heights = normals @ points.T - np.einsum("ij,ij->i", normals, a)[:, None]
-    one_side = (heights >= -slack).all(axis=1) | (heights <= slack).all(axis=1)
+    slopes = normals @ directions.T
+    above = (heights >= -slack).all(axis=1) & (slopes >= 0.0).all(axis=1)
+    below = (heights <= slack).all(axis=1) & (slopes <= 0.0).all(axis=1)
+    one_side = above | below
     return bool(one_side.all())

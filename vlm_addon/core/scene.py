@@ -67,6 +67,12 @@ class Material:
     normal_texture: int = NO_TEXTURE
     normal_strength: float = 1.0
 
+    @property
+    def has_specular_layer(self) -> bool:
+        """Whether anything of it reflects other than diffusely."""
+        is_dielectric = self.specular_ior_level > 0.0 and self.ior != 1.0
+        return self.model == PRINCIPLED and (self.metallic > 0.0 or is_dielectric)
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -90,6 +96,10 @@ class Mesh:
     reflectance: Float32
     emission: Float32
     dynamic: bool = False
+
+    def bounds(self) -> tuple[Float64, Float64]:
+        """Lower and upper corner, (3,) float64 each, of its vertices, of which there is at least one."""
+        return self.positions.min(axis=0), self.positions.max(axis=0)
 
 
 @dataclass(frozen=True)

@@ -7,24 +7,17 @@ stays right while the lamp and what it can light stay as they are.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..core.array_codec import content_hash
-from ..core.scene import AREA, NO_TEXTURE, SPOT, Float64, Light, Material, Mesh, SceneSnapshot
+from ..core.reach import Bools, box_corners, in_reach
+from ..core.scene import NO_TEXTURE, Light, Material, SceneSnapshot
 from .geometry import TEXTURE_FIELDS
 from .local_space import LocalSpace, make_local_space
 
-Bools = npt.NDArray[np.bool_]
-
-WIDEST_HALF_ANGLE = math.radians(89.0)
-"""Of half a SPOT's cone: a wider one counts as the half space before the lamp."""
-MARGIN = 1e-6
-"""A mesh counts as inside while it is outside by less than this share of its distance: what rounding may move."""
 _MESH_FIELDS = ("positions", "triangles", "corner_normals", "corner_uvs", "corner_colors")
 
 
@@ -47,7 +40,7 @@ class LampScenes:
         meshes = tuple(mesh for mesh in snapshot.meshes if len(mesh.triangles))
         materials = snapshot.materials or (Material("default"),)
         self._snapshot = replace(snapshot, meshes=meshes, materials=materials, camera=None)
-        self._corners = np.array([_box_corners(mesh) for mesh in meshes]).reshape(-1, 8, 3)
+        self._corners = np.array([box_corners(*mesh.bounds()) for mesh in meshes]).reshape(-1, 8, 3)
         self._used = [np.unique(mesh.material_indices, return_inverse=True) for mesh in meshes]
         textures = [content_hash(replace(texture, name="")) for texture in snapshot.textures]
         looks = [_look_hash(material, textures) for material in materials]
@@ -85,30 +78,6 @@ class LampScenes:
         )
         space = make_local_space(part)
         return space.scene(part), space
-
-
-def in_reach(light: Light, corners: Float64) -> Bools:
-    """Which boxes, (n, 8, 3) corners in world space, are not wholly outside of what `light` can shine on: the half
-    space before an AREA lamp, the pyramid around a SPOT's cone, everything for others."""
-    inside = np.ones(len(corners), bool)
-    if light.kind not in (AREA, SPOT):
-        return inside
-    towards = corners - np.array(light.position)
-    local = towards @ np.array([light.x_axis, light.y_axis, light.z_axis]).T
-    slack = MARGIN * np.linalg.norm(towards, axis=2).max(axis=1, initial=0.0)
-    inside &= local[..., 2].min(axis=1) < slack
-    if light.kind == SPOT and 0.5 * light.spot_angle < WIDEST_HALF_ANGLE:
-        tangent = math.tan(0.5 * light.spot_angle)
-        for axis, scale in enumerate(light.spot_scale):
-            for sign in (1.0, -1.0):
-                beyond = sign * local[..., axis] + tangent * scale * local[..., 2]
-                inside &= beyond.min(axis=1) < slack
-    return inside
-
-
-def _box_corners(mesh: Mesh) -> Float64:
-    low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
-    return np.array([np.where(bits, high, low) for bits in np.ndindex(2, 2, 2)])
 
 
 def _look_hash(material: Material, textures: list[str]) -> str:

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a scene has and shows, as far as it decides which effects are worth their time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .lamps import lamp_hull
+from .light_mesh import VirtualLightMesh
+from .occluders import Occlusion
+from .reach import box_corners, in_reach
+from .scene import SUN, UNTAGGED, Float64, Light, Material, SceneSnapshot
+from .world_light import is_lit_by_world
+
+NO_SPECULAR, OWN_SPECULAR, SPECULAR_BY_EFFECTS = "none", "own", "effects"
+
+
+@dataclass(frozen=True)
+class TechniqueFacts:
+    """What the technique of the frame finds by itself.
+
+    has_indirect: whether there is indirect light in its picture. knows_visibility: whether that light is occluded where
+    something stands in its way. asks_visibility: whether its settings ask for what the plan may leave out for that.
+    specular: whether it has indirect light in glossy surfaces: none, its own, or what effects add.
+    has_reflecting_lights: whether its lights are polygons that show in glossy surfaces.
+    """
+
+    name: str
+    has_indirect: bool
+    knows_visibility: bool
+    asks_visibility: bool
+    specular: str
+    has_reflecting_lights: bool
+
+
+@dataclass(frozen=True)
+class ScreenFacts:
+    """What one picture shows, counted on the device. pixels: of the picture; shown: with a surface; glossy: of those,
+    with a specular layer; low, high: (3,) float64 bounds of the shown surface, meaningless without any."""
+
+    pixels: int
+    shown: int
+    glossy: int
+    low: Float64
+    high: Float64
+
+
+@dataclass(frozen=True)
+class LightMeshFacts:
+    """Of a virtual light mesh. reflecting: lights that reflect; glowing: lights that shine by themselves."""
+
+    lights: int
+    reflecting: int
+    glowing: int
+    tagged: int
+    dynamic: int
+
+
+@dataclass(frozen=True)
+class LampFacts:
+    """Names of lamps. shining: that light something; dark: without power; beside: that shine past every surface.
+    not_on_screen: of the shining ones, those that light nothing that the picture shows."""
+
+    shining: tuple[str, ...]
+    dark: tuple[str, ...]
+    beside: tuple[str, ...]
+    not_on_screen: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SceneFacts:
+    """What decides; names are those of the snapshot. glossy, glowing, see_through: names of materials that some
+    triangle has and that have a specular layer, shine, let light through. tagged_surface: whether a triangle has a
+    tag. occlusion: of light between surfaces; lamp_occlusion: of that from lamps, too. screen: None before there is a picture. samples:
+    pictures of the frame."""
+
+    scene: str
+    triangles: int
+    lamps: LampFacts
+    is_lit_by_world: bool
+    glowing: tuple[str, ...]
+    glossy: tuple[str, ...]
+    see_through: tuple[str, ...]
+    tagged_surface: bool
+    light_mesh: LightMeshFacts | None
+    occlusion: Occlusion
+    lamp_occlusion: Occlusion
+    technique: TechniqueFacts
+    screen: ScreenFacts | None
+    samples: int
+
+    @property
+    def has_light(self) -> bool:
+        """Whether anything shines."""
+        glows = self.light_mesh is not None and self.light_mesh.glowing > 0
+        return bool(self.lamps.shining) or self.is_lit_by_world or bool(self.glowing) or glows
+
+
+def gather_facts(
+    snapshot: SceneSnapshot,
+    light_mesh: VirtualLightMesh | None,
+    technique: TechniqueFacts,
+    occlusion: Occlusion,
+    lamp_occlusion: Occlusion,
+    samples: int,
+    screen: ScreenFacts | None = None,
+) -> SceneFacts:
+    """The facts of a snapshot in world space without the lights of its world; `screen` likewise."""
+    used = _used_materials(snapshot)
+    return SceneFacts(
+        scene=snapshot.name,
+        triangles=snapshot.triangle_count,
+        lamps=_lamp_facts(snapshot, screen),
+        is_lit_by_world=is_lit_by_world(snapshot),
+        glowing=tuple(material.name for material in used if max(material.emission) > 0.0),
+        glossy=tuple(material.name for material in used if material.has_specular_layer),
+        see_through=tuple(material.name for material in used if material.alpha < 1.0 or material.alpha_texture >= 0),
+        tagged_surface=any((mesh.tag_ids != UNTAGGED).any() for mesh in snapshot.meshes),
+        light_mesh=None if light_mesh is None else _light_mesh_facts(light_mesh),
+        occlusion=occlusion,
+        lamp_occlusion=lamp_occlusion,
+        technique=technique,
+        screen=screen,
+        samples=samples,
+    )
+
+
+def lamp_sources(lights: Sequence[Light]) -> tuple[Float64, Float64]:
+    """Where light of lamps starts, for occluders.find_occlusion: (p, 3) points that have the lamps between them, m, and
+    (d, 3) directions towards suns."""
+    shining = [lamp for lamp in lights if max(lamp.power) > 0.0]
+    found, suns = ([lamp_hull(lamp) for lamp in shining if (lamp.kind == SUN) == is_sun] for is_sun in (False, True))
+    return np.concatenate([np.zeros((0, 3)), *found]), np.concatenate([np.zeros((0, 3)), *suns])
+
+
+def _used_materials(snapshot: SceneSnapshot) -> tuple[Material, ...]:
+    if not snapshot.materials:
+        return (Material("default"),) if snapshot.triangle_count else ()
+    used = {int(index) for mesh in snapshot.meshes for index in np.unique(mesh.material_indices)}
+    return tuple(snapshot.materials[index] for index in sorted(used))
+
+
+def _lamp_facts(snapshot: SceneSnapshot, screen: ScreenFacts | None) -> LampFacts:
+    boxes = np.array([box_corners(*mesh.bounds()) for mesh in snapshot.meshes if len(mesh.triangles)])
+    lit = [lamp for lamp in snapshot.lights if max(lamp.power) > 0.0]
+    shining = [lamp for lamp in lit if in_reach(lamp, boxes.reshape(-1, 8, 3)).any()]
+    hidden: list[Light] = []
+    if screen is not None and screen.shown:
+        box = box_corners(screen.low, screen.high)[None]
+        hidden = [lamp for lamp in shining if not in_reach(lamp, box).any()]
+    return LampFacts(
+        _names(shining),
+        _names(lamp for lamp in snapshot.lights if lamp not in lit),
+        _names(lamp for lamp in lit if lamp not in shining),
+        _names(hidden),
+    )
+
+
+def _names(lamps: Iterator[Light] | list[Light]) -> tuple[str, ...]:
+    return tuple(lamp.name for lamp in lamps)
+
+
+def _light_mesh_facts(light_mesh: VirtualLightMesh) -> LightMeshFacts:
+    sends = light_mesh.strength > 0.0
+    return LightMeshFacts(
+        len(light_mesh),
+        int((sends & (light_mesh.colour > 0.0).any(axis=1)).sum()),
+        int((sends & (light_mesh.emission > 0.0).any(axis=1)).sum()),
+        int((light_mesh.tag_ids != UNTAGGED).sum()),
+        int(light_mesh.dynamic.sum()),
+    )
