@@ -76,6 +76,21 @@ class VirtualLightMesh:
         """(n, 3) float64 W/m²: of lights on which 1 W/m² of each channel falls."""
         return np.asarray(self.strength[:, None] * (self.emission + self.colour), np.float64)
 
+    def subset(self, chosen: npt.NDArray[np.bool_]) -> VirtualLightMesh:
+        """The lights of `chosen`, (n,) bool, in order, with the vertices and samples that are theirs."""
+        used, corners = np.unique(self.triangles[chosen], return_inverse=True)
+        counts = np.diff(self.samples.offsets)
+        sampled = np.repeat(chosen, counts)
+        samples = SourceSamples(
+            positions=self.samples.positions[sampled],
+            normals=self.samples.normals[sampled],
+            weights=self.samples.weights[sampled],
+            offsets=np.concatenate([[0], np.cumsum(counts[chosen])]).astype(np.int32),
+        )
+        rows = {name: getattr(self, name)[chosen] for name in ("colour", "emission", "strength", "tag_ids", "dynamic")}
+        triangles = corners.reshape(-1, 3).astype(np.int32)
+        return VirtualLightMesh(vertices=self.vertices[used], triangles=triangles, samples=samples, **rows)
+
 
 def empty_light_mesh() -> VirtualLightMesh:
     """A light mesh without lights."""

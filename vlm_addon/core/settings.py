@@ -41,6 +41,8 @@ class SettingInfo:
         """What values there are, in words."""
         if self.type is bool:
             return "true or false"
+        if self.type is str and not self.choices:
+            return self.unit
         return ", ".join(self.choices) if self.choices else f"{self.low} to {self.high} {self.unit}".strip()
 
 

@@ -46,6 +46,10 @@ class LightStructures:
         self._kept = kept
         self._on_device = on_device
 
+    def kept_in(self, kept: Kept) -> LightStructures:
+        """Structures of other lights beside these, kept in another place."""
+        return LightStructures(kept, self._on_device)
+
     def trees(
         self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float
     ) -> tuple[list[LitTree], float]:
