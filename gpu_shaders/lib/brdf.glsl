@@ -95,15 +95,19 @@ float widened_alpha(float alpha, float solid_angle) {
 }
 
 // GGX lobe with height-correlated Smith shadowing (Heitz 2014), without Fresnel, times the cosine of the light.
-float ggx_lobe(float cos_half, float cos_light, float cos_view, float alpha) {
+// sine_squared: of the angle between the normal and the half vector.
+float ggx_lobe_of_sine(float sine_squared, float cos_light, float cos_view, float alpha) {
     float alpha_squared = alpha * alpha;
-    // 1 - cos² without cancellation matters for sharp lobes; cos_half is close to 1 there.
-    float sine_squared = max((1.0 - cos_half) * (1.0 + cos_half), 0.0);
     float denominator = alpha_squared + sine_squared * (1.0 - alpha_squared);
     float distribution = alpha_squared * INVERSE_PI / max(denominator * denominator, 1e-30);
     float view_part = cos_light * sqrt(cos_view * cos_view * (1.0 - alpha_squared) + alpha_squared);
     float light_part = cos_view * sqrt(cos_light * cos_light * (1.0 - alpha_squared) + alpha_squared);
     return distribution * cos_light * 0.5 / max(view_part + light_part, 1e-20);
+}
+
+float ggx_lobe(float cos_half, float cos_light, float cos_view, float alpha) {
+    // 1 - cos² without cancellation matters for sharp lobes; cos_half is close to 1 there.
+    return ggx_lobe_of_sine(max((1.0 - cos_half) * (1.0 + cos_half), 0.0), cos_light, cos_view, alpha);
 }
 
 // What the specular lobe reflects of light whose half vector stands at cos_vh to the view; times the GGX lobe.

@@ -166,6 +166,16 @@ def test_ggx_lobe_against_the_oracle(device: Device) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
+def test_ggx_lobe_of_a_sine_keeps_its_digits_next_to_the_peak(device: Device) -> None:
+    """Where the cosine of the half vector rounds to 1."""
+    sines = (0.0, 1e-8, 1e-5, 0.3)
+    found = function(device, "ggx_lobe_of_sine(s * s, 0.7, 0.4, alpha)", s=sines, alpha=ALPHAS)
+    sine, alpha = of_all(sines, ALPHAS)
+    denominator = alpha**2 + sine**2 * (1.0 - alpha**2)
+    part = 0.7 * np.sqrt(0.16 * (1 - alpha**2) + alpha**2) + 0.4 * np.sqrt(0.49 * (1 - alpha**2) + alpha**2)
+    np.testing.assert_allclose(found, alpha**2 / np.pi / denominator**2 * 0.35 / part, rtol=1e-5)
+
+
 def test_ggx_lobe_stays_finite_at_its_ends(device: Device) -> None:
     found = function(device, "ggx_lobe(h, l, v, alpha)", h=COSINES, l=COSINES, v=COSINES, alpha=(0.0, 1e-20, *ALPHAS))
     assert np.isfinite(found).all()
