@@ -26,11 +26,11 @@ struct ShadowPoint {
     vec2 tile;      // of the face in the map
 };
 
-// Position and normal in the frame of the face that sees the point.
-ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
+// Position and normal in the frame of the face that sees the point. offset: m, from the map's origin.
+ShadowPoint shadow_place(Lamp lamp, vec3 offset, vec3 n) {
     mat3 axes = mat3(lamp.x_axis, lamp.y_axis, lamp.z_axis);
     vec3 m = n * axes;
-    vec3 q = (p - lamp.shadow_origin) * axes;
+    vec3 q = offset * axes;
     if (lamp.shadow_kind == SHADOW_PARALLEL) {
         return ShadowPoint(q, m, vec2(0.0));
     }
@@ -46,6 +46,11 @@ ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
     int face = 2 * axis + int(negative);
     vec2 tile = vec2(float(face % SHADOW_CUBE_COLUMNS), float(face / SHADOW_CUBE_COLUMNS));
     return ShadowPoint(negative ? q * flip : q, negative ? m * flip : m, tile);
+}
+
+// The same of a point p from the local origin, for a map in units of the same space.
+ShadowPoint shadow_point(Lamp lamp, vec3 p, vec3 n) {
+    return shadow_place(lamp, p - lamp.shadow_origin, n);
 }
 
 // Share in [0, 1] of a texel's area around p in which nothing stands before the receiver's plane.
@@ -64,7 +69,9 @@ float lit_share(sampler2D map, Lamp lamp, vec3 p, vec3 n, float tilt) {
     // Depth grows with the tangent of the angle of incidence, its change with the square of one over the cosine.
     float least = lamp.world_solid_angle > 0.0 ? SHADOW_LEAST_OF_WORLD : 1e-4;
     float steepness = 1.0 / max(cos_lamp * cos_lamp, least);
-    ShadowPoint receiver = shadow_point(lamp, p, n);
+    // In the order that loses nothing near the origin.
+    vec3 offset = lamp.shadow_scale * ((p - lamp.shadow_origin) - lamp.shadow_origin_rest);
+    ShadowPoint receiver = shadow_place(lamp, offset, n);
     if (!parallel && receiver.position.z <= 0.0) {
         return 0.0; // at the lamp, or behind a spot
     }

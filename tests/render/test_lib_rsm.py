@@ -12,7 +12,7 @@ from vlm_addon.core.scene import DIFFUSE, PRINCIPLED, Float64
 from vlm_addon.render.albedo_texture import AlbedoTexture
 from vlm_addon.render.device import Device
 from vlm_addon.render.gpu_layout import CONSTANTS
-from vlm_addon.render.passes.shadow_map import CUBE_FACES, CUBE_TILES
+from vlm_addon.render.shadow_views import CUBE_FACES, CUBE_TILES
 
 FILE = "lib/rsm.glsl"
 AXES = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]

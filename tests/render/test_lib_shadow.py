@@ -25,6 +25,7 @@ NEAR = 1e-3
 def lamp(kind: str, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     """A sun straight above or a lamp at LAMP_HEIGHT over `origin`; its map spans 2 m, or 45° to each side."""
     record = LAMP.zeros(1)
+    record["shadow_scale"] = 1.0
     is_sun = kind == "SHADOW_PARALLEL"
     record["kind"] = CONSTANTS["LAMP_SUN" if is_sun else "LAMP_POINT"]
     record["shadow_kind"] = CONSTANTS[kind]

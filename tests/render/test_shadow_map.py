@@ -14,7 +14,8 @@ from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, Materia
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
-from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass, shadow_kind
+from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass
+from vlm_addon.render.shadow_views import shadow_kind
 
 RESOLUTION = 512
 SCALES = [1e-3, 1.0, 1e3]

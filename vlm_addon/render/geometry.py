@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +29,15 @@ TEXTURE_FIELDS = {
 }
 
 
+Share = Callable[[str, Callable[[], Any]], Any]
+"""Gives what is on the device already under a name, or what the function makes."""
+
+
+def made_anew(name: str, make: Callable[[], Any]) -> Any:
+    """The Share of geometry that shares nothing."""
+    return make()
+
+
 @dataclass(frozen=True)
 class _Batch:
     """A run of triangles that need the same textures. textures: index by texture unit, NO_TEXTURE for none."""
@@ -47,8 +57,16 @@ class GpuGeometry:
     origin: (3,) float64, in the snapshot's own space. low, high: (3,) float64, visible bounds from the origin.
     """
 
-    def __init__(self, context: moderngl.Context, snapshot: SceneSnapshot, origin: Float64 | None = None) -> None:
-        """origin: the centre of the visible bounds by default.
+    def __init__(
+        self,
+        context: moderngl.Context,
+        snapshot: SceneSnapshot,
+        origin: Float64 | None = None,
+        share: Share = made_anew,
+        for_shadows: bool = False,
+    ) -> None:
+        """origin: the centre of the visible bounds by default. share: is asked for each buffer and for the textures, by
+        name (render/kept_geometry.py). for_shadows: only what `draw_opaque` and `draw_with_alpha` read of shadow maps.
 
         Raises InvalidInput for vertices that are not finite or a material index without material.
         """
@@ -62,13 +80,20 @@ class GpuGeometry:
         self.low: Float64 = low - self.origin
         self.high: Float64 = high - self.origin
         self.triangle_count = sum(len(mesh.triangles) for mesh in meshes)
-        order = self._make_batches(meshes)
-        self._buffers = self._upload_vertices(meshes, order)
-        self._triangles = self._storage_buffer(_triangle_records(meshes, order, self.origin).tobytes(), "triangles")
-        self._material_buffer = self._storage_buffer(_material_records(self._materials).tobytes(), "materials")
-        self._textures = [_upload_texture(context, texture) for texture in snapshot.textures]
+        ranks = self._make_batches(meshes)
+        # Sorted only where something is uploaded.
+        order = cache(lambda: np.argsort(ranks, kind="stable"))
+        self._buffers = self._upload_vertices(meshes, order, share, for_shadows)
+        self._vertex_arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
+        if for_shadows and not self.has_alpha:
+            return
+        self._triangles = share("triangles", lambda: self._upload_triangles(meshes, order()))
+        self._material_buffer = share("materials", self._upload_materials)
+        self._textures: list[moderngl.Texture] = [
+            share(f"texture {index}", partial(_upload_texture, context, texture))
+            for index, texture in enumerate(snapshot.textures)
+        ]
         self._white = context.texture((1, 1), 4, np.ones(4, np.float32).tobytes(), dtype="f4")
-        self._vertex_arrays: dict[int, moderngl.VertexArray] = {}
 
     @property
     def variants(self) -> dict[str, bool]:
@@ -115,18 +140,18 @@ class GpuGeometry:
     def _render(self, program: moderngl.Program, first: int, count: int) -> None:
         if count == 0:
             return
-        if program.glo not in self._vertex_arrays:
+        if program not in self._vertex_arrays:
             content = [
                 (buffer, attribute_format, name)
                 for name, (buffer, attribute_format) in self._buffers.items()
                 if name in program
             ]
-            self._vertex_arrays[program.glo] = self._context.vertex_array(program, content)
-        self._vertex_arrays[program.glo].render(vertices=3 * count, first=3 * first)
+            self._vertex_arrays[program] = self._context.vertex_array(program, content)
+        self._vertex_arrays[program].render(vertices=3 * count, first=3 * first)
 
     def _make_batches(self, meshes: Sequence[Mesh]) -> np.ndarray:
-        """Order of the snapshot's triangles by batch, opaque batches first; fills `_batches` and `opaque_count`."""
-        keys = [_batch_key(material) for material in self._materials]
+        """(t,) place of each triangle's batch; fills `_batches`, opaque ones first, and `opaque_count`."""
+        keys = [batch_key(material) for material in self._materials]
         ranking = sorted(set(keys))
         rank_of_material = np.array([ranking.index(key) for key in keys])
         indices = [mesh.material_indices for mesh in meshes]
@@ -140,27 +165,45 @@ class GpuGeometry:
         ]
         is_opaque = np.array([not has_alpha for has_alpha, _ in ranking])
         self.opaque_count = int(counts[is_opaque].sum())
-        return np.argsort(ranks, kind="stable")
+        return ranks
 
-    def _upload_vertices(self, meshes: Sequence[Mesh], order: np.ndarray) -> dict[str, tuple[moderngl.Buffer, str]]:
+    def _upload_vertices(
+        self, meshes: Sequence[Mesh], order: Callable[[], np.ndarray], share: Share, for_shadows: bool
+    ) -> dict[str, tuple[moderngl.Buffer, str]]:
         """Attribute name: (buffer, moderngl format)."""
-        corners = [(mesh.positions - self.origin).astype(np.float32)[mesh.triangles] for mesh in meshes]
-        attributes = {
-            "in_position": ("3f4", corners),
-            "in_normal": ("3f4", [mesh.corner_normals for mesh in meshes]),
-            "in_uv": ("2f4", [mesh.corner_uvs for mesh in meshes]),
+        if not meshes:
+            return {}
+        attributes: dict[str, tuple[str, Callable[[], Sequence[np.ndarray]]]] = {
+            "in_position": ("3f4", lambda: self._corners(meshes))
         }
-        if any(material.base_color_from_corners for material in self._materials):
-            attributes["in_color"] = ("3f4", [_filled_colors(mesh) for mesh in meshes])
+        if not for_shadows or self.has_alpha:
+            attributes["in_uv"] = ("2f4", lambda: [mesh.corner_uvs for mesh in meshes])
         with_normal_map = np.array([material.normal_texture != NO_TEXTURE for material in self._materials])
-        if with_normal_map.any():
-            tangents = [corner_tangents(mesh, with_normal_map[mesh.material_indices]) for mesh in meshes]
-            attributes["in_tangent"] = ("4f4", tangents)
+        if not for_shadows:
+            attributes["in_normal"] = ("3f4", lambda: [mesh.corner_normals for mesh in meshes])
+            if any(material.base_color_from_corners for material in self._materials):
+                attributes["in_color"] = ("3f4", lambda: [_filled_colors(mesh) for mesh in meshes])
+            if with_normal_map.any():
+                tangents = [(mesh, with_normal_map[mesh.material_indices]) for mesh in meshes]
+                attributes["in_tangent"] = ("4f4", lambda: [corner_tangents(*item) for item in tangents])
         return {
-            name: (self._context.buffer(_joined(parts, order).tobytes()), attribute_format)
+            name: (share(name, partial(self._vertex_buffer, parts, order)), attribute_format)
             for name, (attribute_format, parts) in attributes.items()
-            if parts
         }
+
+    def _corners(self, meshes: Sequence[Mesh]) -> list[np.ndarray]:
+        return [(mesh.positions - self.origin).astype(np.float32)[mesh.triangles] for mesh in meshes]
+
+    def _vertex_buffer(
+        self, parts: Callable[[], Sequence[np.ndarray]], order: Callable[[], np.ndarray]
+    ) -> moderngl.Buffer:
+        return self._context.buffer(_joined(parts(), order()).tobytes())
+
+    def _upload_triangles(self, meshes: Sequence[Mesh], order: np.ndarray) -> moderngl.Buffer:
+        return self._storage_buffer(_triangle_records(meshes, order, self.origin).tobytes(), "triangles")
+
+    def _upload_materials(self) -> moderngl.Buffer:
+        return self._storage_buffer(_material_records(self._materials).tobytes(), "materials")
 
     def _storage_buffer(self, data: bytes, what: str) -> moderngl.Buffer:
         limit = int(self._context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
@@ -172,7 +215,8 @@ class GpuGeometry:
         return self._context.buffer(data or bytes(16))
 
 
-def _batch_key(material: Material) -> tuple[bool, tuple[int, ...]]:
+def batch_key(material: Material) -> tuple[bool, tuple[int, ...]]:
+    """Whether a material may let light through, and the textures it needs: what is drawn together has the same."""
     has_alpha = material.alpha < 1.0 or material.alpha_texture != NO_TEXTURE
     return has_alpha, tuple(getattr(material, TEXTURE_FIELDS[unit]) for unit in sorted(TEXTURE_FIELDS))
 

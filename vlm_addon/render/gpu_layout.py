@@ -157,6 +157,8 @@ LAMP = GpuStruct(
         ("float", "sample_weight"),
         ("float", "shadow_rounding"),
         ("float", "world_solid_angle"),
+        ("vec3", "shadow_origin_rest"),
+        ("float", "shadow_scale"),
     ),
 )
 """One sample of a lamp and the frame of its shadow map; filled by render/lamp_records.py, read by lib/lights.glsl.
@@ -168,6 +170,8 @@ clockwise seen from its shining side. shadow_extent: tangent of half the field o
 size in m. shadow_origin: where the map's coordinates and depths start; shadow_centre: of a parallel map, m from there.
 shadow_near: m, nearest distance in a perspective map. shadow_rounding: m, what float32 leaves of a surface's place.
 world_solid_angle: sr, of the part of the world that a LAMP_SUN without radius stands for; 0 for a lamp.
+shadow_scale: units of the space that a kept map is drawn in for each of this one, 1 where both are the same; the map's
+lengths are in its own. shadow_origin_rest: what float32 has no digits for in shadow_origin.
 """
 
 SOURCE_SAMPLE = GpuStruct(

@@ -22,6 +22,7 @@ def lamp_record(light: Light, sample: LampSample, origin: Float64) -> np.ndarray
     record["position"] = np.array(light.z_axis) if at_infinity else np.array(light.position) - origin
     record["sample_position"] = sample.position if at_infinity else sample.position - origin
     record["sample_weight"] = sample.share
+    record["shadow_scale"] = 1.0
     power = np.array(light.power, np.float64)
     for name in ("x_axis", "y_axis", "z_axis"):
         record[name] = getattr(light, name)

@@ -7,6 +7,7 @@ large the scene is or where in the world it lies, so a scene that is moved or sc
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,8 @@ HALF_DIAGONAL = 1024.0
 both far from the ends of float32."""
 GRAIN = 0.25
 """The origin moves in steps of this many local units, so that a small move of the camera rounds nothing anew."""
+STILL_GRAIN = 128.0
+"""The same of the space that no camera moves: so that an object which widens the scene a little moves nothing else."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +92,7 @@ def make_local_space(snapshot: SceneSnapshot) -> LocalSpace:
     camera or extent it falls back to the middle and to metres.
     """
     low, high = snapshot.bounds()
-    half_diagonal = 0.5 * float(np.linalg.norm(high - low))
-    usable = np.isfinite(half_diagonal) and half_diagonal > 0.0
+    half_diagonal, usable = _half_diagonal(low, high)
     unit = half_diagonal / HALF_DIAGONAL if usable else 1.0
     middle = 0.5 * (low + high)
     eye = middle if snapshot.camera is None else snapshot.camera.matrix_world[:3, 3]
@@ -98,3 +100,23 @@ def make_local_space(snapshot: SceneSnapshot) -> LocalSpace:
         return LocalSpace(np.where(np.isfinite(middle), middle, 0.0), unit)
     steps = np.round((np.clip(eye, low, high) - middle) / (GRAIN * unit))
     return LocalSpace(middle + steps * (GRAIN * unit), unit)
+
+
+def make_still_space(low: Float64, high: Float64) -> LocalSpace:
+    """A space for everything between two corners, (3,) m, that is the same from wherever it is seen.
+
+    Its unit is a power of two in m and its origin lies on a coarse grid, so that most things that move leave it as it
+    is. Falls back as `make_local_space`.
+    """
+    half_diagonal, usable = _half_diagonal(low, high)
+    middle = 0.5 * (low + high)
+    if not usable:
+        return LocalSpace(np.where(np.isfinite(middle), middle, 0.0), 1.0)
+    unit = 2.0 ** math.ceil(math.log2(half_diagonal / HALF_DIAGONAL))
+    return LocalSpace(np.round(middle / (STILL_GRAIN * unit)) * (STILL_GRAIN * unit), unit)
+
+
+def _half_diagonal(low: Float64, high: Float64) -> tuple[float, bool]:
+    """Of the box between two corners, and whether it is a finite length above 0."""
+    half_diagonal = 0.5 * float(np.linalg.norm(high - low))
+    return half_diagonal, bool(np.isfinite(half_diagonal) and half_diagonal > 0.0)

@@ -12,7 +12,7 @@ from ..core.mesh_topology import Bool
 from ..core.scene import Float64, Int32
 from ..core.vpl_placement import ConePoints
 from .gpu_layout import CONSTANTS
-from .passes.shadow_map import CUBE_TILES
+from .shadow_views import CUBE_TILES
 
 
 @dataclass(frozen=True)

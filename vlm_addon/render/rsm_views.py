@@ -11,7 +11,7 @@ import numpy as np
 from ..core.scene import AREA, POINT, SPOT, SUN, Float64, Light
 from .geometry import GpuGeometry
 from .gpu_layout import CONSTANTS
-from .passes.shadow_map import CUBE_FACES, CUBE_TILES, FRONT_FACE, NARROWEST_CONE, shadow_kind
+from .shadow_views import CUBE_FACES, CUBE_TILES, FRONT_FACE, NARROWEST_CONE, shadow_kind
 from .view import View
 
 # Nearest surface that a lamp sees, of the distance to the farthest.

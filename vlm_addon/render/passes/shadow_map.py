@@ -5,32 +5,29 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...core.lamps import is_soft, lamp_samples
-from ...core.scene import AREA, SPOT, SUN, Float64, Light
+from ...core.scene import SUN, Float64, Light
 from ..geometry import GpuGeometry
 from ..gpu_layout import CONSTANTS
+from ..kept import Kept
+from ..kept_shadow_maps import KeptShadowMaps
 from ..lamp_records import lamp_record
+from ..local_space import LocalSpace
 from ..shader_library import ShaderLibrary, set_uniforms
+from ..shadow_casters import ShadowCasters
+from ..shadow_views import CUBE_TILES, Bounds, cone_widening, shadow_kind, shadow_views
 from ..shadow_windows import ShadowWindow
 
 if TYPE_CHECKING:
     import moderngl
 
 VERTEX, FRAGMENT = "passes/shadow_map.vert", "passes/shadow_map.frag"
-# Above this cone one perspective map wastes most of its texels on the rim.
-WIDEST_CONE = math.radians(120.0)
-NARROWEST_CONE = 1e-6
-"""Tangent of half the angle of a map; a spot without a cone shines nowhere."""
-# Faces of a cube: index of the axis that looks forward, its sign. The other two axes follow cyclically.
-CUBE_FACES = ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0))
-FRONT_FACE = 5
-CUBE_TILES = (int(CONSTANTS["SHADOW_CUBE_COLUMNS"]), int(CONSTANTS["SHADOW_CUBE_ROWS"]))
 # A map of one tile has this many times the cube's texels per side: about as many in all.
 SINGLE_TILE_FACTOR = 2
 # Maps of soft lamps are this much coarser: many of them are averaged, and drawn for every picture.
@@ -39,16 +36,12 @@ WORLD_DIVISOR = 4
 """Likewise maps of the world's light from more than SHARP_ANGLE: its lights' number makes the error, not texels."""
 SHARP_ANGLE = math.radians(4.0)
 LEAST_RESOLUTION = 16
-# Texels around what must be seen, for the filter.
-MARGIN = 2.0
-# Nearest occluder that counts, of the distance to the farthest: no precision depends on it.
-NEAREST = 1e-6
 # Rounding of a vertex and of its interpolation, of half the scene's diagonal.
 ROUNDING = 2.0**-23
 # Height of what a sun's map does not show, m.
 EMPTY_HEIGHT = -1e30
-# Bytes of maps that are kept for all samples of a frame; further lamps are drawn again.
-CACHE_BYTES = 1 << 29
+KIND = "shadow maps"
+"""Of what is counted as kept over frames."""
 
 
 @dataclass(frozen=True)
@@ -70,14 +63,17 @@ class ShadowMapPass:
     """Draws maps of nearness for lamps of every kind."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, resolution: int) -> None:
-        """resolution: texels along a cube's face; a map of a single view has twice as many, soft lamps half."""
+        """resolution: texels along a cube's face; a map of a single view has twice as many, soft lamps half.
+
+        empty: the texture of maps without any shadow.
+        """
         self._context = context
         self._opaque = shaders.program(VERTEX, FRAGMENT)
         self._shaders = shaders
         # The largest map, three tiles wide, must fit a texture.
         self._resolution = min(resolution, int(context.info["GL_MAX_TEXTURE_SIZE"]) // max(CUBE_TILES))
-        self._empty = self._new_texture((2, 2))
-        context.framebuffer([self._empty]).clear()
+        self.empty = self._new_texture((2, 2))
+        context.framebuffer([self.empty]).clear()
 
     def new_texture(self, light: Light) -> moderngl.Texture:
         """A texture of the size that maps of `light` need."""
@@ -114,11 +110,12 @@ class ShadowMapPass:
         together: int = 1,
         texture: moderngl.Texture | None = None,
         window: ShadowWindow | None = None,
+        bounds: Bounds | None = None,
     ) -> ShadowMap:
         """The map of one of `sample_count` points of `light`, drawn over `texture` if one is given.
 
         together: how many consecutive points are used in one picture. window: the part of the scene that the map of a
-        SUN must show; all of it by default.
+        SUN must show; all of it by default. bounds: of all that can show in the map; the geometry's by default.
 
         A lamp that casts no shadow, or a scene without triangles, gives an empty map.
         """
@@ -126,13 +123,14 @@ class ShadowMapPass:
         sample = samples[sample_index % len(samples)]
         record = lamp_record(light, sample, geometry.origin)
         if not light.casts_shadow or geometry.triangle_count == 0:
-            return ShadowMap(self._empty, record)
+            return ShadowMap(self.empty, record)
         record["shadow_kind"] = CONSTANTS[shadow_kind(light)]
-        record["shadow_rounding"] = ROUNDING * 0.5 * float(np.linalg.norm(geometry.high - geometry.low))
+        record["shadow_rounding"] = rounding((geometry.low, geometry.high))
         target = texture or self.new_texture(light)
         framebuffer = self._context.framebuffer([target])
         framebuffer.clear(red=EMPTY_HEIGHT if light.kind == SUN else 0.0)
-        for matrix, viewport in self._views(light, record, geometry, window):
+        seen = bounds or (geometry.low, geometry.high)
+        for matrix, viewport in shadow_views(light, record, seen, window, self.size(light)):
             framebuffer.viewport = viewport
             self._draw(framebuffer, geometry, matrix, record, sample_index)
         return ShadowMap(target, record)
@@ -167,120 +165,38 @@ class ShadowMapPass:
             geometry.draw_with_alpha(program)
         self._context.blend_equation = moderngl.FUNC_ADD  # type: ignore[assignment]
 
-    def _views(
-        self, light: Light, record: np.ndarray, geometry: GpuGeometry, window: ShadowWindow | None
-    ) -> list[tuple[Float64, tuple[int, int, int, int]]]:
-        """Matrix to clip space from the offset to `shadow_origin`, and viewport of each tile; fills the shadow fields
-        of `record`."""
-        corners = _box_corners(geometry.low, geometry.high)
-        axes = np.array([record[name][0] for name in ("x_axis", "y_axis", "z_axis")], np.float64)
-        width, height = self.size(light)
-        if light.kind == SUN:
-            if window is None:
-                matrix = _fitted_view(record, corners, axes, width)
-            else:
-                matrix = _window_view(record, window, 0.5 * (geometry.low + geometry.high), axes, width)
-            return [(matrix, (0, 0, width, height))]
-        record["shadow_origin"] = record["sample_position"]
-        origin = record["sample_position"][0].astype(np.float64)
-        seen = (corners - origin) @ axes.T
-        near = NEAREST * float(np.linalg.norm(seen, axis=1).max())
-        record["shadow_near"] = near
-        if shadow_kind(light) == "SHADOW_CONE":
-            tangents = math.tan(0.5 * light.spot_angle) * np.array(light.spot_scale) / (1.0 - 2.0 * MARGIN / width)
-            tangents = np.maximum(tangents, NARROWEST_CONE)
-            record["shadow_extent"] = tangents
-            return [(_perspective(axes, FRONT_FACE, tangents, near), (0, 0, width, height))]
-        side = self._face(light)
-        tangents = np.full(2, 1.0 / (1.0 - 2.0 * MARGIN / side))
-        record["shadow_extent"] = tangents
-        return [
-            (_perspective(axes, face, tangents, near), _tile(face, side))
-            for face in range(len(CUBE_FACES))
-            if _may_see(light, face, seen, float(tangents[0]))
-        ]
+
+@dataclass(frozen=True)
+class StillLamps:
+    """Lamps and what they shine on in a space that no camera moves, so that maps of them outlast a frame.
+
+    lights: in world space, as those of the frame. space: the frame's.
+    """
+
+    casters: ShadowCasters
+    kept: Kept
+    lights: tuple[Light, ...]
+    space: LocalSpace
 
 
-def _tile(face: int, side: int) -> tuple[int, int, int, int]:
-    """Viewport of a cube's face in its map."""
-    return face % CUBE_TILES[0] * side, face // CUBE_TILES[0] * side, side, side
+@dataclass(frozen=True)
+class _Source:
+    """What a lamp's maps are drawn from. light: in the space of the geometry; key: of all that they depend on but the
+    sample; bounds: of what shows in them; space: of the geometry, None for the frame's."""
 
-
-def shadow_kind(light: Light) -> str:
-    """Name of the projection of a lamp's map, among gpu_layout.CONSTANTS."""
-    if light.kind == SUN:
-        return "SHADOW_PARALLEL"
-    if light.kind == SPOT and light.spot_angle * max(1.0, *light.spot_scale) <= WIDEST_CONE:
-        return "SHADOW_CONE"
-    return "SHADOW_CUBE"
-
-
-def _box_corners(low: Float64, high: Float64) -> Float64:
-    return np.array([[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
-
-
-def _may_see(light: Light, face: int, seen: Float64, tangent: float) -> bool:
-    """Whether a cube's face can hold an occluder: the scene's bounds, in the lamp's frame, reach into its frustum."""
-    axis, sign = CUBE_FACES[face]
-    if light.kind in (AREA, SPOT) and axis == 2 and sign > 0.0:
-        return False
-    forward = sign * seen[:, axis]
-    if (forward <= 0.0).all():
-        return False
-    sides = [seen[:, (axis + 1) % 3], seen[:, (axis + 2) % 3]]
-    return not any((side * way > tangent * forward).all() for side in sides for way in (1.0, -1.0))
-
-
-def _perspective(axes: Float64, face: int, tangents: Float64, near: float) -> Float64:
-    """Clip matrix of a face with w = distance along its axis, without far plane."""
-    axis, sign = CUBE_FACES[face]
-    right, up, forward = axes[(axis + 1) % 3], axes[(axis + 2) % 3], sign * axes[axis]
-    matrix = np.zeros((4, 4))
-    matrix[:, :3] = right / tangents[0], up / tangents[1], forward, forward
-    matrix[2, 3] = -2.0 * near
-    return matrix
-
-
-def _fitted_view(record: np.ndarray, corners: Float64, axes: Float64, side: int) -> Float64:
-    """Clip matrix of a parallel map that fits `corners` (8, 3)."""
-    middle = corners.mean(axis=0)
-    seen = (corners - middle) @ axes.T
-    # A flat or empty extent still gets a size.
-    least = 1e-6 * max(float(np.abs(corners).max()), float(np.abs(seen).max()), 1e-30)
-    half = np.maximum(np.abs(seen[:, :2]).max(axis=0), least) / (1.0 - 2.0 * MARGIN / side)
-    return _parallel(record, middle, np.zeros(2), half, axes)
-
-
-def _window_view(record: np.ndarray, window: ShadowWindow, anchor: Float64, axes: Float64, side: int) -> Float64:
-    """Clip matrix of a parallel map of `window`. Its texels lie on a grid through `anchor`, wherever the window is."""
-    texel = 2.0 * window.radius / (side - 2.0 * (MARGIN + 1.0))
-    centre = np.array(window.centre)
-    place = (centre - anchor) @ axes[:2].T
-    return _parallel(record, centre, texel * np.round(place / texel) - place, np.full(2, 0.5 * side * texel), axes)
-
-
-def _parallel(record: np.ndarray, origin: Float64, centre: Float64, half: Float64, axes: Float64) -> Float64:
-    """Clip matrix of a parallel map; depth is not clipped."""
-    record["shadow_origin"] = origin
-    # What is lost in rounding the origin is given back.
-    centre = centre + (origin - record["shadow_origin"][0].astype(np.float64)) @ axes[:2].T
-    record["shadow_extent"], record["shadow_centre"] = half, centre
-    matrix = np.zeros((4, 4))
-    matrix[:2, :3], matrix[:2, 3], matrix[3, 3] = axes[:2] / half[:, None], -centre / half, 1.0
-    return matrix
-
-
-class _KeptMaps:
-    """Maps that never change, and textures for those that do, by size."""
-
-    def __init__(self) -> None:
-        self.kept: dict[tuple[Light, ShadowWindow | None], ShadowMap] = {}
-        self.kept_bytes = 0
-        self.shared: dict[tuple[int, int], moderngl.Texture] = {}
+    light: Light
+    key: str
+    geometry: Callable[[], GpuGeometry]
+    bounds: Bounds | None
+    space: LocalSpace | None
 
 
 class LampShadows:
-    """The maps of a scene's lamps over the samples of a frame: those that never change are drawn once."""
+    """The maps of a scene's lamps over the samples of a frame and, with StillLamps, over frames.
+
+    The map of a whole lamp is drawn in the still space and outlasts camera moves; windows around the eye are drawn in
+    the frame's space, which has digits enough for them.
+    """
 
     def __init__(
         self,
@@ -289,31 +205,60 @@ class LampShadows:
         geometry: GpuGeometry,
         lights: Sequence[Light],
         resolution: int,
+        still: StillLamps | None = None,
     ) -> None:
+        """lights: in the geometry's space. Without `still`, all maps are drawn from the geometry and last as long as
+        this."""
         self.lights = tuple(lights)
-        self._geometry = geometry
+        self.bounds: Bounds = geometry.low, geometry.high
+        self._geometry: Callable[[], GpuGeometry] = lambda: geometry
+        self._is_empty, self._has_alpha = geometry.triangle_count == 0, geometry.has_alpha
+        self._origin = geometry.origin
         self._pass = ShadowMapPass(context, shaders, resolution)
-        self._maps = _KeptMaps()
+        self._still = still
+        self._world = {} if still is None else dict(zip(self.lights, still.lights, strict=True))
+        self._space = None if still is None else still.space
+        self._keeps_samples = still is not None
+        self._sources: dict[tuple[Light, ShadowWindow | None], _Source] = {}
+        self._shared: dict[tuple[int, int], moderngl.Texture] = {}
+        self._maps = KeptShadowMaps()
+        if still is not None:
+            self._maps = still.kept.hold(KIND, KeptShadowMaps)
+            still.kept.at_end(KIND, self._maps.drop_unasked)
 
     def for_lights(self, lights: Sequence[Light]) -> LampShadows:
-        """The same for other lights; what both have is drawn once for both."""
+        """The same for other lights, of these or SUNs; what both have is drawn once for both."""
         other = copy.copy(self)
         other.lights = tuple(lights)
         return other
 
-    @property
-    def bounds(self) -> tuple[Float64, Float64]:
-        """Lower and upper corner of all that casts shadows, (3,) float64, m from the local origin."""
-        return self._geometry.low, self._geometry.high
+    def still(self) -> tuple[LampShadows, LocalSpace]:
+        """The same lamps in the space that no camera moves, with what is drawn there; and that space."""
+        assert self._still is not None
+        casters, space = self._still.casters, self._still.casters.space
+        other = copy.copy(self)
+        world = [self._world_light(light) for light in self.lights]
+        other.lights = tuple(space.light(light) for light in world)
+        other.bounds = casters.low, casters.high
+        other._geometry, other._origin, other._space = casters.geometry, np.zeros(3), space
+        other._world = dict(zip(other.lights, world, strict=True))
+        other._keeps_samples = False
+        other._sources = {}
+        return other, space
 
     def uses_windows(self, lamp_index: int) -> bool:
         """Whether the lamp's map can be confined to a part of the scene."""
         light = self.lights[lamp_index]
-        return light.kind == SUN and light.casts_shadow and self._geometry.triangle_count > 0
+        return light.kind == SUN and light.casts_shadow and not self._is_empty
 
     def side(self, lamp_index: int) -> int:
         """Texels along the lamp's map."""
         return self._pass.size(self.lights[lamp_index])[0]
+
+    def key(self, lamp_index: int) -> str:
+        """Hash of all that the shadows of a lamp depend on, in the still space."""
+        light = self.lights[lamp_index]
+        return self._source(light, None).key if light.casts_shadow and not self._is_empty else ""
 
     def shadow_map(
         self,
@@ -327,19 +272,19 @@ class LampShadows:
 
         together: how many consecutive samples are used in one picture. window: as in ShadowMapPass.render.
         """
-        light, maps = self.lights[lamp_index], self._maps
-        key = (light, window)
-        if key in maps.kept:
-            return maps.kept[key]
-        width, height = self._pass.size(light)
-        if self._changes(light) or maps.kept_bytes >= CACHE_BYTES:
-            if (width, height) not in maps.shared:
-                maps.shared[width, height] = self._pass.new_texture(light)
-            texture = maps.shared[width, height]
-            return self._pass.render(self._geometry, light, sample_index, sample_count, together, texture, window)
-        maps.kept[key] = self._pass.render(self._geometry, light, sample_index, sample_count, window=window)
-        maps.kept_bytes += 4 * width * height
-        return maps.kept[key]
+        light = self.lights[lamp_index]
+        sampled = (sample_index, sample_count, together)
+        source = None if self._is_empty or not light.casts_shadow else self._source(light, window)
+        if source is None or (source.bounds is None and source.space is not None):
+            return ShadowMap(self._pass.empty, self._record(light, *sampled))
+        changes = self._changes(light)
+        key = f"{source.key} {sampled}" if changes else source.key
+        found = self._maps.get(key)
+        if found is None:
+            found = self._draw(source, sampled, window, key, self._keeps_samples or not changes)
+        elif self._still is not None:
+            self._still.kept.count(KIND, is_new=False)
+        return ShadowMap(found.texture, self._placed(found.record, source, light, sampled))
 
     def samples_of(self, lamp_index: int, most: int) -> int:
         """How many samples of a lamp differ, at most `most`."""
@@ -348,4 +293,83 @@ class LampShadows:
 
     def _changes(self, light: Light) -> bool:
         """Whether samples differ: points of a soft lamp, or occluders that are let through by chance."""
-        return is_soft(light) or (light.casts_shadow and self._geometry.has_alpha)
+        return is_soft(light) or (light.casts_shadow and self._has_alpha)
+
+    def _source(self, light: Light, window: ShadowWindow | None) -> _Source:
+        if (light, window) not in self._sources:
+            self._sources[light, window] = self._new_source(light, window)
+        return self._sources[light, window]
+
+    def _new_source(self, light: Light, window: ShadowWindow | None) -> _Source:
+        if self._still is None:
+            return _Source(light, repr((light, window)), self._geometry, None, None)
+        casters, digests, world = self._still.casters, self._still.kept.digests, self._world_light(light)
+        size = self._pass.size(light)
+        widening = cone_widening(size[0]) if shadow_kind(light) == "SHADOW_CONE" else 0.0
+        seen, bounds = casters.seen_by(world, widening)
+        key = digests.of(seen, _shadow_shape(world), size)
+        if window is None:
+            return _Source(casters.space.light(world), key, casters.geometry, bounds, casters.space)
+        return _Source(light, digests.of(key, window, self._space), self._geometry, self.bounds, None)
+
+    def _world_light(self, light: Light) -> Light:
+        # A sun is the same in every space.
+        return light if light.kind == SUN else self._world[light]
+
+    def _draw(
+        self, source: _Source, sampled: tuple[int, int, int], window: ShadowWindow | None, key: str, keep: bool
+    ) -> ShadowMap:
+        size = self._pass.size(source.light)
+        keep = keep and self._maps.has_room(size)
+        texture = self._maps.spare(size) if keep else self._shared.get(size)
+        found = self._pass.render(source.geometry(), source.light, *sampled, texture, window, source.bounds)
+        if keep:
+            self._maps.add(key, found)
+        else:
+            self._shared[size] = found.texture
+        if self._still is not None:
+            self._still.kept.count(KIND, is_new=True)
+        return found
+
+    def _record(self, light: Light, sample_index: int, sample_count: int, together: int) -> np.ndarray:
+        samples = lamp_samples(light, sample_count, together)
+        return lamp_record(light, samples[sample_index % len(samples)], self._origin)
+
+    def _placed(self, drawn: np.ndarray, source: _Source, light: Light, sampled: tuple[int, int, int]) -> np.ndarray:
+        """The record of a sample of a lamp with the shadow fields of its map, taken into the frame's space."""
+        record = self._record(light, *sampled)
+        for name in _SHADOW_FIELDS:
+            record[name] = drawn[name]
+        if source.space is None or source.space is self._space:
+            return record
+        assert self._space is not None
+        scale, offset = source.space.to(self._space)
+        origin = scale * drawn["shadow_origin"][0].astype(np.float64) + offset
+        record["shadow_origin"] = origin
+        record["shadow_origin_rest"] = origin - record["shadow_origin"][0].astype(np.float64)
+        record["shadow_scale"] = 1.0 / scale
+        # The receiver is rounded in another space than what it is compared with.
+        record["shadow_rounding"] += rounding(self.bounds) / scale
+        return record
+
+
+_SHADOW_FIELDS = (
+    "shadow_kind",
+    "shadow_origin",
+    "shadow_extent",
+    "shadow_centre",
+    "shadow_near",
+    "shadow_rounding",
+)
+
+
+def rounding(bounds: Bounds) -> float:
+    """What float32 leaves of the places of vertices within `bounds`, m."""
+    return ROUNDING * 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
+
+
+def _shadow_shape(light: Light) -> Light:
+    """`light` without what its shadows do not depend on."""
+    position = (0.0, 0.0, 0.0) if light.kind == SUN else light.position
+    ones = (1.0, 1.0, 1.0)
+    return replace(light, name="", power=ones, position=position, spot_blend=0.0, soft_falloff=True)

@@ -18,8 +18,9 @@ from ..gpu_layout import CONSTANTS, LAMP
 from ..lamp_records import lamp_record
 from ..local_space import HALF_DIAGONAL, LocalSpace
 from ..shader_library import ShaderLibrary, set_uniforms
+from ..shadow_views import NEAREST
 from .gbuffer import GBuffer
-from .shadow_map import FRAGMENT, NEAREST, ROUNDING, VERTEX
+from .shadow_map import FRAGMENT, ROUNDING, VERTEX
 
 if TYPE_CHECKING:
     import moderngl
