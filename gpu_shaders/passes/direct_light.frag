@@ -49,7 +49,11 @@ void main() {
     vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
     vec3 irradiance = lamp_irradiance(lamp, position, normal);
     LampRay ray = lamp_ray(lamp, position);
+#if HAS_HIGHLIGHTS
     vec3 specular_irradiance = dot(normal, ray.direction) > 0.0 ? ray.irradiance : vec3(0.0);
+#else
+    const vec3 specular_irradiance = vec3(0.0);
+#endif
     if (max(max(irradiance.r, irradiance.g), irradiance.b) <= 0.0 && specular_irradiance == vec3(0.0)) {
         return;
     }
@@ -60,8 +64,10 @@ void main() {
     Surface surface = fetch_surface(pixel);
     vec3 to_camera = is_orthographic ? camera_backward : normalize(camera_position - position);
     Reflector reflector = make_reflector(surface, to_camera, albedo_table);
+    vec3 radiance = reflector.diffuse * INVERSE_PI * irradiance;
+#if HAS_HIGHLIGHTS
     reflector.alpha = widened_alpha(reflector.alpha, ray.solid_angle);
-    vec3 radiance = reflector.diffuse * INVERSE_PI * irradiance
-        + specular_reflection(reflector, normal, ray.direction, to_camera) * specular_irradiance;
+    radiance += specular_reflection(reflector, normal, ray.direction, to_camera) * specular_irradiance;
+#endif
     out_radiance = vec4(share * lit * radiance, 0.0);
 }

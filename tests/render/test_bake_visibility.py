@@ -16,7 +16,6 @@ from tests.render.rooms import camera_at, quad, split
 from vlm_addon.core.baked_visibility import FULL, UNFACED, BakedVisibility, make_baked, row_weights
 from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
-from vlm_addon.core.occluders import Occlusion
 from vlm_addon.core.progress import silent
 from vlm_addon.core.scene import DIFFUSE, POINT, Float32, Light, Material, SceneSnapshot
 from vlm_addon.core.triangle_tree import build_tree
@@ -156,7 +155,7 @@ def test_no_lights_and_no_rows_give_no_shares(device: Device, baked: tuple, ligh
 
 
 def test_without_anything_in_the_way_the_picture_is_the_same_to_the_bit(
-    device: Device, monkeypatch: pytest.MonkeyPatch
+    device: Device,
 ) -> None:
     """The room alone, baked though nothing need be."""
     room = lit(SceneSnapshot("room", tuple(inward_box((0, 0, 0), (2, 2, 2), [0] * 6)), WHITE))
@@ -165,8 +164,7 @@ def test_without_anything_in_the_way_the_picture_is_the_same_to_the_bit(
     skipped = device.render(room, lights, settings())
     assert any("no visibility is baked" in reason for reason in skipped.reasons)
     assert "visibility_rows" not in skipped.counters
-    monkeypatch.setattr(vlm, "scene_occlusion", lambda scene: Occlusion(True, "asked for by a test"))
-    found = device.render(room, lights, settings())
+    found = device.render(room, lights, replace(settings(), effects={"light_visibility": "on"}))
     assert found.counters["visibility_pixels_without"] == 0
     assert (irradiance(found) == irradiance(plain)).all()
     shares = device.kept.get(scene_visibility.KIND, _kept_key(device), _unexpected).baked.shares

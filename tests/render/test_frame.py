@@ -14,10 +14,10 @@ from vlm_addon.core.errors import Cancelled, InvalidInput
 from vlm_addon.core.form_factor import polygon_form_factor
 from vlm_addon.core.scene import DIFFUSE, POINT, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
-from vlm_addon.render.frame import NO_SURFACE
+from vlm_addon.render.finished_images import NO_SURFACE
 from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.render.geometry import GpuGeometry
-from vlm_addon.render.passes.accumulate import AccumulatePass, jitter_offsets
+from vlm_addon.render.passes.accumulate import AccumulatePass, PictureLight, jitter_offsets
 from vlm_addon.render.passes.gbuffer import GBufferPass
 from vlm_addon.render.view import make_view
 
@@ -244,7 +244,7 @@ def test_a_value_that_is_no_number_stays_in_its_pixel(device: Device) -> None:
         texture = context.texture((8, 8), 4, direct.tobytes(), dtype="f4")
         accumulate = AccumulatePass(context, device.shaders, 8, 8)
         for _ in range(2):
-            accumulate.add(gbuffer, texture, None, view, (0.0, 0.0, 0.0), 0.5)
+            accumulate.add(gbuffer, PictureLight(texture), view, (0.0, 0.0, 0.0), 0.5)
         combined = accumulate.read()["combined"]
     broken = np.isnan(combined).any(axis=2)
     assert np.argwhere(broken).tolist() == [[8 - 1 - 3, 5]]

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,11 +16,9 @@ from tests.render.occluded_room import corners_of, room, wall_lights
 from tests.render.rooms import camera_at, lights_from_triangles, quad, split
 from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.light_mesh import VirtualLightMesh
-from vlm_addon.core.occluders import Occlusion
 from vlm_addon.core.scene import DIFFUSE, POINT, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.techniques import vlm
 
 MODES = [{"lights": "all"}, {"lights": "tolerance", "tolerance": 0.05}, {"lights": "range", "range": 30.0}]
 MODE_NAMES = ["all", "tolerance", "range"]
@@ -33,9 +33,14 @@ def lit(snapshot: SceneSnapshot) -> SceneSnapshot:
 
 
 def rendered(
-    device: Device, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, samples: int = 1, **settings: Any
+    device: Device,
+    snapshot: SceneSnapshot,
+    light_mesh: VirtualLightMesh,
+    samples: int = 1,
+    effects: Mapping[str, str] = MappingProxyType({}),
+    **settings: Any,
 ) -> Frame:
-    wanted = RenderSettings(32, 24, "vlm", settings, samples, 128, 1, buffers=True)
+    wanted = RenderSettings(32, 24, "vlm", settings, samples, 128, 1, buffers=True, effects=dict(effects))
     return device.render(snapshot, light_mesh, wanted)
 
 
@@ -45,18 +50,15 @@ def wall_light_mesh() -> VirtualLightMesh:
 
 
 @pytest.mark.parametrize("mode", MODES, ids=MODE_NAMES)
-def test_where_all_is_visible_nothing_changes_to_the_bit(
-    device: Device, mode: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_all_is_visible_nothing_changes_to_the_bit(device: Device, mode: dict[str, Any]) -> None:
     snapshot, lights = lit(room(False)), wall_light_mesh()
     without = rendered(device, snapshot, lights, **mode)
     skipped = rendered(device, snapshot, lights, visibility="octree", **mode)
-    monkeypatch.setattr(vlm, "scene_occlusion", lambda scene: Occlusion(True, "for once"))
-    cast = rendered(device, snapshot, lights, visibility="octree", **mode)
+    cast = rendered(device, snapshot, lights, effects={"light_visibility": "on"}, visibility="octree", **mode)
     assert cast.counters["visibility_rays"] > 0.9 * 4 * 32 * 24
     assert "visibility_rays" not in skipped.counters
     assert any(text.startswith("no visibility rays are cast: nothing can occlude") for text in skipped.reasons)
-    assert any(text == "visibility rays are cast: for once" for text in cast.reasons)
+    assert any(text.startswith("visibility rays are cast: switched on, though nothing can") for text in cast.reasons)
     assert without.images["indirect"].max() > 0.0
     for name in ("irradiance", "indirect", "combined"):
         np.testing.assert_array_equal(skipped.images[name], without.images[name])

@@ -6,7 +6,7 @@ An effect is left out where its own output is provably neutral, so the picture w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,6 +53,11 @@ class EffectPlan:
         """Of two pictures of a frame: an effect runs where it runs in one of them."""
         pairs = zip(self.effects, other.effects, strict=True)
         return replace(self, effects=tuple(b if a.action == SKIP and b.action == RUN else a for a, b in pairs))
+
+
+def plan_from_tree(tree: Mapping[str, Any]) -> EffectPlan:
+    """The plan whose `array_codec.flatten` gave `tree`."""
+    return EffectPlan(*(tuple(Decision(**item) for item in tree[part]) for part in ("effects", "structures")))
 
 
 def plan_effects(facts: SceneFacts, choices: Mapping[str, str] | None = None, *, economical: bool = True) -> EffectPlan:
@@ -120,14 +125,12 @@ def _require_known(name: str, choice: Any) -> None:
         raise InvalidInput(f"effect {name!r}", f"{choice!r} is not a choice", f"use one of: {', '.join(CHOICES)}")
 
 
-def structure_decisions(events: Mapping[str, Mapping[str, int]], label: Callable[[str], str]) -> tuple[Decision, ...]:
-    """Of what is kept over frames. events: how many of each kind were "built" and "reused" in the frame."""
+def structure_decisions(events: Mapping[str, tuple[int, int]]) -> tuple[Decision, ...]:
+    """Of what is kept over frames. events: by kind, how many a frame made and how many it used again."""
     found = []
-    for kind, counts in events.items():
-        built, reused = counts.get("built", 0), counts.get("reused", 0)
-        if built:
-            text = f"{built} made, as what they depend on is new or has changed"
-            found.append(Decision(kind, label(kind), RUN, f"{text}; {reused} kept" if reused else text))
-        else:
-            found.append(Decision(kind, label(kind), REUSE, f"{reused} kept: nothing that they depend on has changed"))
+    for kind, (built, reused) in sorted(events.items()):
+        label = kind.replace("_", " ").capitalize()
+        text = f"{built} made: what they depend on is new or has changed" if built else "nothing has changed for them"
+        reason = f"{text}; {reused} used again" if reused else text
+        found.append(Decision(kind, label, RUN if built else REUSE, reason))
     return tuple(found)

@@ -12,6 +12,8 @@ from .scene import AREA, SPOT, Float64, Light
 
 Bools = npt.NDArray[np.bool_]
 
+BOUNDED_KINDS = (AREA, SPOT)
+"""Lamps that do not shine everywhere."""
 WIDEST_HALF_ANGLE = math.radians(89.0)
 """Of half a SPOT's cone: a wider one counts as the half space before the lamp."""
 MARGIN = 1e-6
@@ -22,7 +24,7 @@ def in_reach(light: Light, corners: Float64) -> Bools:
     """Which boxes, (n, 8, 3) corners in the lamp's space, are not wholly outside of what `light` can shine on: the half
     space before an AREA lamp, the pyramid around a SPOT's cone (of each point of its ball), everything for others."""
     inside = np.ones(len(corners), bool)
-    if light.kind not in (AREA, SPOT):
+    if light.kind not in BOUNDED_KINDS:
         return inside
     towards = corners - np.array(light.position)
     local = towards @ np.array([light.x_axis, light.y_axis, light.z_axis]).T

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,11 +29,11 @@ class TechniqueFacts:
     """
 
     name: str
-    has_indirect: bool
-    knows_visibility: bool
-    asks_visibility: bool
-    specular: str
-    has_reflecting_lights: bool
+    has_indirect: bool = True
+    knows_visibility: bool = False
+    asks_visibility: bool = False
+    specular: str = SPECULAR_BY_EFFECTS
+    has_reflecting_lights: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,6 @@ class LightMeshFacts:
     reflecting: int
     glowing: int
     tagged: int
-    dynamic: int
 
 
 @dataclass(frozen=True)
@@ -72,10 +71,12 @@ class LampFacts:
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What decides; names are those of the snapshot. glossy, glowing, see_through: names of materials that some
-    triangle has and that have a specular layer, shine, let light through. tagged_surface: whether a triangle has a
-    tag. occlusion: of light between surfaces; lamp_occlusion: of that from lamps, too. screen: None before there is a picture. samples:
-    pictures of the frame."""
+    """What decides; names are those of the snapshot.
+
+    glossy, glowing: names of materials that some triangle has and that have a specular layer, or shine. tagged_surface:
+    whether a triangle has a tag. occlusion: of light between surfaces; lamp_occlusion: of that from lamps, too. screen:
+    None before there is a picture. samples: pictures of the frame.
+    """
 
     scene: str
     triangles: int
@@ -83,7 +84,6 @@ class SceneFacts:
     is_lit_by_world: bool
     glowing: tuple[str, ...]
     glossy: tuple[str, ...]
-    see_through: tuple[str, ...]
     tagged_surface: bool
     light_mesh: LightMeshFacts | None
     occlusion: Occlusion
@@ -106,24 +106,22 @@ def gather_facts(
     occlusion: Occlusion,
     lamp_occlusion: Occlusion,
     samples: int,
-    screen: ScreenFacts | None = None,
 ) -> SceneFacts:
-    """The facts of a snapshot in world space without the lights of its world; `screen` likewise."""
+    """The facts of a snapshot in world space without the lights of its world, before there is a picture."""
     used = _used_materials(snapshot)
     return SceneFacts(
         scene=snapshot.name,
         triangles=snapshot.triangle_count,
-        lamps=_lamp_facts(snapshot, screen),
+        lamps=lamp_facts(snapshot),
         is_lit_by_world=is_lit_by_world(snapshot),
         glowing=tuple(material.name for material in used if max(material.emission) > 0.0),
         glossy=tuple(material.name for material in used if material.has_specular_layer),
-        see_through=tuple(material.name for material in used if material.alpha < 1.0 or material.alpha_texture >= 0),
         tagged_surface=any((mesh.tag_ids != UNTAGGED).any() for mesh in snapshot.meshes),
         light_mesh=None if light_mesh is None else _light_mesh_facts(light_mesh),
         occlusion=occlusion,
         lamp_occlusion=lamp_occlusion,
         technique=technique,
-        screen=screen,
+        screen=None,
         samples=samples,
     )
 
@@ -143,14 +141,12 @@ def _used_materials(snapshot: SceneSnapshot) -> tuple[Material, ...]:
     return tuple(snapshot.materials[index] for index in sorted(used))
 
 
-def _lamp_facts(snapshot: SceneSnapshot, screen: ScreenFacts | None) -> LampFacts:
+def lamp_facts(snapshot: SceneSnapshot, screen: ScreenFacts | None = None) -> LampFacts:
+    """Of the lamps of a snapshot in world space; `screen` likewise."""
     boxes = np.array([box_corners(*mesh.bounds()) for mesh in snapshot.meshes if len(mesh.triangles)])
     lit = [lamp for lamp in snapshot.lights if max(lamp.power) > 0.0]
     shining = [lamp for lamp in lit if in_reach(lamp, boxes.reshape(-1, 8, 3)).any()]
-    hidden: list[Light] = []
-    if screen is not None and screen.shown:
-        box = box_corners(screen.low, screen.high)[None]
-        hidden = [lamp for lamp in shining if not in_reach(lamp, box).any()]
+    hidden = [] if screen is None else [lamp for lamp in shining if not lights_picture(lamp, screen)]
     return LampFacts(
         _names(shining),
         _names(lamp for lamp in snapshot.lights if lamp not in lit),
@@ -159,7 +155,12 @@ def _lamp_facts(snapshot: SceneSnapshot, screen: ScreenFacts | None) -> LampFact
     )
 
 
-def _names(lamps: Iterator[Light] | list[Light]) -> tuple[str, ...]:
+def lights_picture(lamp: Light, screen: ScreenFacts) -> bool:
+    """Whether a lamp with power can shine on something that a picture shows, whatever stands in between."""
+    return screen.shown > 0 and bool(in_reach(lamp, box_corners(screen.low, screen.high)[None]).any())
+
+
+def _names(lamps: Iterable[Light]) -> tuple[str, ...]:
     return tuple(lamp.name for lamp in lamps)
 
 
@@ -170,5 +171,4 @@ def _light_mesh_facts(light_mesh: VirtualLightMesh) -> LightMeshFacts:
         int((sends & (light_mesh.colour > 0.0).any(axis=1)).sum()),
         int((sends & (light_mesh.emission > 0.0).any(axis=1)).sum()),
         int((light_mesh.tag_ids != UNTAGGED).sum()),
-        int(light_mesh.dynamic.sum()),
     )

@@ -24,6 +24,7 @@ import numpy as np
 
 from ..core.array_codec import flatten, unflatten
 from ..core.baked_visibility import BakedVisibility
+from ..core.effects import plan_from_tree
 from ..core.errors import Cancelled, DeviceError, InvalidInput, ShaderError, VlmError
 from ..core.light_grid_file import visibility_from_tree
 from ..core.light_mesh import VirtualLightMesh
@@ -223,6 +224,7 @@ class RenderProcess:
             timer=tree["timer"],
             findings=tuple(Finding(**finding) for finding in tree["findings"]),
             reasons=tuple(tree["reasons"]),
+            plan=plan_from_tree(tree["plan"]),
         )
 
     def _next(self, progress: Progress) -> dict[str, Any]:

@@ -3,36 +3,52 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.array_codec import content_hash
+from ..core.effects import EffectPlan, structure_decisions
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.progress import Progress, step
-from ..core.scene import Camera, Finding, Float32, Light, SceneSnapshot
+from ..core.scene import Camera, Finding, Light, SceneSnapshot
+from ..core.scene_facts import ScreenFacts
 from ..core.settings import from_mapping
 from ..core.world_light import is_lit_by_world, world_lights
+from .finished_images import display_image, finished_images, surface_images
+from .frame_effects import FrameEffects, effect_settings
+from .frame_plan import FramePlanner
 from .frame_types import Frame, RenderSettings, require_in_range
 from .geometry import GpuGeometry
+from .kept import Kept
 from .local_space import LocalSpace, make_local_space
-from .passes.accumulate import AccumulatePass, jitter_offsets, read_image
+from .passes.accumulate import AccumulatePass, PictureLight, jitter_offsets
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
+from .passes.screen_census import ScreenCensusPass
 from .passes.shadow_map import LampShadows
-from .passes.tonemap import ToneMapPass
 from .picture_shares import direct_world_lights, picture_shares
 from .technique import FrameInputs, SceneInputs, technique_by_name
 from .view import make_view, require_usable
 
 if TYPE_CHECKING:
-    from .device import Device
+    from .device import Device, PassTimer
 
-NO_SURFACE = -1
 # Share of a frame's progress that comes before its first sample.
 PREPARED = 0.1
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What a frame is made with. kept: things of earlier frames, or none where nothing is to be used again."""
+
+    device: Device
+    settings: RenderSettings
+    kept: Kept
+    progress: Progress
 
 
 def render_frame(
@@ -43,90 +59,139 @@ def render_frame(
     progress: Progress,
 ) -> Frame:
     """The picture of `snapshot`. Raises InvalidInput for what cannot be rendered, Cancelled when asked to stop."""
+    kept = device.kept if settings.economical else Kept()
+    with kept.frame():
+        return _render(_Stage(device, settings, kept, progress), snapshot, light_mesh)
+
+
+def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None) -> Frame:
+    device, settings, progress = stage.device, stage.settings, stage.progress
     technique_type = technique_by_name(settings.technique)
     chosen: object = from_mapping(
         technique_type.settings, settings.technique_settings, f"technique {settings.technique!r}"
     )
+    chosen_effects = effect_settings(settings)
+    technique_type.require_light_mesh(light_mesh)
     _require_renderable(snapshot, light_mesh, settings)
     context, shaders, timer = device.context, device.shaders, device.timer()
     lamps = len(snapshot.lights)
+    world: tuple[Light, ...] = ()
     direct_world: tuple[Light, ...] = ()
     if is_lit_by_world(snapshot):
         with timer.measure("world lights"):
-            snapshot, direct_world = _with_world_lights(device, snapshot, settings)
-    width, height = settings.width, settings.height
+            world, direct_world = _world_lights(stage, snapshot)
+    with timer.measure("plan"):
+        planner = FramePlanner(stage.kept, snapshot, light_mesh, world, technique_type.facts(chosen), settings)
+    plan = planner.plan
+    if not plan.runs("world_lights"):
+        world = direct_world = ()
+    lit = replace(snapshot, lights=(*snapshot.lights, *world))
     # From here on nothing is in world space but what is read back.
-    space = make_local_space(snapshot)
-    local, camera = _localised(space, snapshot)
-    local_lights = None if light_mesh is None else space.light_mesh(light_mesh)
+    space = make_local_space(lit)
+    local, camera = _localised(space, lit)
     step(progress, 0.0, "geometry")
     with timer.measure("geometry"):
         geometry = GpuGeometry(context, local, np.zeros(3))
-    shadows = LampShadows(context, shaders, geometry, local.lights, settings.shadow_resolution)
+    shadows = LampShadows(context, shaders, geometry, _casting(local.lights, plan), settings.shadow_resolution)
     # A sun is the same in every space.
-    direct_shadows = shadows.for_lights((*local.lights[:lamps], *direct_world))
+    direct_shadows = shadows.for_lights((*shadows.lights[:lamps], *_casting(direct_world, plan)))
     scene = SceneInputs(
-        context,
-        shaders,
-        timer,
-        local,
-        geometry,
-        shadows,
-        local_lights,
-        snapshot,
-        light_mesh,
-        space,
-        device.light_structures,
-        device.kept,
-        settings,
-        _within(progress, 0.0, PREPARED),
+        context=context,
+        shaders=shaders,
+        timer=timer,
+        snapshot=local,
+        geometry=geometry,
+        shadows=shadows,
+        light_mesh=None if light_mesh is None else space.light_mesh(light_mesh),
+        world=lit,
+        world_lights=light_mesh,
+        space=space,
+        structures=device.light_structures.kept_in(stage.kept),
+        kept=stage.kept,
+        settings=settings,
+        progress=_within(progress, 0.0, PREPARED),
+        plan=plan,
     )
-    technique = technique_type(scene, chosen)
-    direct_light = DirectLightPass(context, shaders, width, height)
-    gbuffer_pass = GBufferPass(context, shaders, width, height)
-    accumulate = AccumulatePass(context, shaders, width, height, snapshot.environment)
+    technique = technique_type(scene, chosen) if plan.runs("indirect_light") and not settings.plan_only else None
+    direct_light = DirectLightPass(context, shaders, settings.width, settings.height)
+    gbuffer_pass = GBufferPass(context, shaders, settings.width, settings.height)
+    accumulate = AccumulatePass(context, shaders, settings.width, settings.height, snapshot.environment)
+    effects = FrameEffects(scene, technique, chosen_effects, lamps)
     shares = picture_shares(direct_shadows.lights, settings.samples)
+    census = ScreenCensusPass(context, shaders)
 
     for sample, jitter in enumerate(jitter_offsets(settings.samples)):
-        view = make_view(camera, width, height, geometry.origin, tuple(jitter))
+        view = make_view(camera, settings.width, settings.height, geometry.origin, tuple(jitter))
         with timer.measure("G-buffer"):
             gbuffer = gbuffer_pass.render(geometry, view, sample)
-        with timer.measure("direct light"):
-            direct = direct_light.render(
-                gbuffer, direct_shadows, view, sample, settings.samples, settings.shadow_samples, shares[sample]
-            )
+        screen: ScreenFacts | None = None
+        if planner.asks_screen:
+            with timer.measure("screen census"):
+                screen = census.render(gbuffer, space)
+        plan = planner.picture(screen)
+        if settings.plan_only:
+            break
         share = (1.0 - PREPARED) / settings.samples
-        sample_progress = _within(progress, PREPARED + sample * share, share)
-        irradiance = technique.indirect(FrameInputs(view, gbuffer, sample, sample_progress))
+        frame = FrameInputs(view, gbuffer, sample, _within(progress, PREPARED + sample * share, share))
+        direct, irradiance = None, None
+        if plan.runs("direct_light"):
+            picture_lamps = planner.lamp_shares(screen, (*snapshot.lights, *direct_world), shares[sample])
+            with timer.measure("direct light"):
+                direct = direct_light.render(
+                    gbuffer,
+                    direct_shadows,
+                    view,
+                    sample,
+                    settings.samples,
+                    settings.shadow_samples,
+                    picture_lamps,
+                    has_highlights=plan.runs("direct_specular"),
+                )
+        if technique is not None and plan.runs("indirect_light"):
+            irradiance = technique.indirect(frame)
+        openness = effects.openness(plan, frame) if irradiance is not None else None
+        specular = effects.specular(plan, frame, PictureLight(direct, irradiance, openness))
         with timer.measure("accumulate"):
-            weight = 1.0 / settings.samples
-            specular = technique.specular()
-            accumulate.add(gbuffer, direct, irradiance, view, snapshot.world_radiance, weight, specular)
-        step(sample_progress, 1.0, "samples")
+            light = PictureLight(direct, irradiance, openness, specular)
+            accumulate.add(gbuffer, light, view, snapshot.world_radiance, 1.0 / settings.samples)
+        step(frame.progress, 1.0, "samples")
 
+    if settings.plan_only:
+        return _plan_alone(device, planner, stage, timer)
     with timer.measure("read back"):
         sums = accumulate.read()
-    images, findings = _finished_images(sums)
+    images, findings = finished_images(sums)
     if settings.buffers:
         images["coverage"] = np.ascontiguousarray(sums["direct"][..., 3:])
-        images |= _surface_images(gbuffer_pass, geometry, camera, settings, space)
-        images |= technique.images()
+        images |= surface_images(gbuffer_pass, geometry, camera, settings, space)
+        images |= effects.images() | ({} if technique is None else technique.images())
     else:
-        del images["irradiance"]
+        del images["irradiance"], images["specular"]
     if settings.display:
         with timer.measure("tone mapping"):
-            images["display"] = _display_image(device, images["combined"])
+            images["display"] = display_image(device, images["combined"])
     counters = {
         "triangles": geometry.triangle_count,
         "lights": lamps,
-        "world_lights": len(snapshot.lights) - lamps,
+        "world_lights": len(world),
         "world_lights_direct": len(direct_world),
         "samples": settings.samples,
-        **technique.counters(),
+        **({} if technique is None else technique.counters()),
     }
     findings += _scene_findings(snapshot, light_mesh)
-    reasons = tuple(technique.reasons())
-    return Frame(images, timer.timings(), counters, device.name, timer.kind, tuple(findings), reasons)
+    reasons = () if technique is None else tuple(technique.reasons())
+    plan = _whole_plan(planner, stage)
+    return Frame(images, timer.timings(), counters, device.name, timer.kind, tuple(findings), reasons, plan)
+
+
+def _plan_alone(device: Device, planner: FramePlanner, stage: _Stage, timer: PassTimer) -> Frame:
+    return Frame({}, timer.timings(), {}, device.name, timer.kind, plan=_whole_plan(planner, stage))
+
+
+def _whole_plan(planner: FramePlanner, stage: _Stage) -> EffectPlan:
+    """With what was used again."""
+    events = {kind: (reuse.built, reuse.reused) for kind, reuse in stage.kept.events().items()}
+    return replace(planner.plan, structures=structure_decisions(events))
 
 
 def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, settings: RenderSettings) -> None:
@@ -142,19 +207,22 @@ def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | 
         require_valid(light_mesh)
 
 
-def _with_world_lights(
-    device: Device, snapshot: SceneSnapshot, settings: RenderSettings
-) -> tuple[SceneSnapshot, tuple[Light, ...]]:
-    """`snapshot` with the lights of its world after its lamps, and those for direct light. Raises InvalidInput."""
-    world, count = (snapshot.world_radiance, snapshot.environment), settings.world_lights
+def _world_lights(stage: _Stage, snapshot: SceneSnapshot) -> tuple[tuple[Light, ...], tuple[Light, ...]]:
+    """The lights of the world of `snapshot`, and those for direct light. Raises InvalidInput."""
+    world, settings = (snapshot.world_radiance, snapshot.environment), stage.settings
     content = content_hash(list(world))
 
     def kept_lights(kind: str, count: int) -> tuple[Light, ...]:
-        return device.kept.get(kind, f"{content} {count}", lambda: world_lights(*world, count))
+        return stage.kept.get(kind, f"{content} {count}", lambda: world_lights(*world, count))
 
-    lights = kept_lights("world_lights", count)
-    direct = kept_lights("direct_world_lights", direct_world_lights(count, settings.samples))
-    return replace(snapshot, lights=(*snapshot.lights, *lights)), direct
+    lights = kept_lights("world_lights", settings.world_lights)
+    direct_count = direct_world_lights(settings.world_lights, settings.samples)
+    return lights, kept_lights("direct_world_lights", direct_count)
+
+
+def _casting(lights: Sequence[Light], plan: EffectPlan) -> tuple[Light, ...]:
+    """`lights` with shadows where the plan has any."""
+    return tuple(lights if plan.runs("shadows") else (replace(light, casts_shadow=False) for light in lights))
 
 
 def _localised(space: LocalSpace, snapshot: SceneSnapshot) -> tuple[SceneSnapshot, Camera]:
@@ -167,47 +235,6 @@ def _localised(space: LocalSpace, snapshot: SceneSnapshot) -> tuple[SceneSnapsho
 def _within(progress: Progress, start: float, share: float) -> Progress:
     """Progress of a part of the work that begins at `start` and takes `share` of it all."""
     return lambda fraction, label: progress(start + fraction * share, label)
-
-
-def _finished_images(sums: dict[str, Float32]) -> tuple[dict[str, Float32], list[Finding]]:
-    """The pictures with every value finite and at least 0, and what had to be changed for that."""
-    images, findings = {}, []
-    for name, values in sums.items():
-        values = values if name == "combined" else values[..., :3]
-        broken = ~np.isfinite(values).all(axis=2)
-        if broken.any():
-            problem = f"{int(broken.sum())} pixels were not finite"
-            findings.append(Finding(f"image {name!r}", problem, "set to 0; look for broken values in the materials"))
-        clean = np.where(broken[..., None], 0.0, np.maximum(values, 0.0))
-        images[name] = np.ascontiguousarray(clean, np.float32)
-    return images, findings
-
-
-def _display_image(device: Device, image: Float32) -> Float32:
-    """RGBA, display-linear, of a picture of linear RGBA."""
-    height, width = image.shape[:2]
-    picture = device.context.texture((width, height), 4, np.ascontiguousarray(image[::-1]).tobytes(), dtype="f4")
-    return read_image(ToneMapPass(device.context, device.shaders, width, height).render(picture))
-
-
-def _surface_images(
-    gbuffer_pass: GBufferPass, geometry: GpuGeometry, camera: Camera, settings: RenderSettings, space: LocalSpace
-) -> dict[str, Float32]:
-    """What shows at the pixels' centres: world positions in m, normals, base colour, depth in m, ids."""
-    gbuffer = gbuffer_pass.render(geometry, make_view(camera, settings.width, settings.height, geometry.origin), 0)
-    position, normal, base_color, ids = (
-        read_image(texture) for texture in (gbuffer.position, gbuffer.shading_normal, gbuffer.base_color, gbuffer.ids)
-    )
-    shown = np.any(normal[..., :3] != 0.0, axis=2, keepdims=True)
-    images = {
-        "position": np.where(shown, space.world_points(position[..., :3]), 0.0),
-        "normal": normal[..., :3],
-        "albedo": base_color[..., :3],
-        "depth": position[..., 3:] * space.unit,
-    }
-    for channel, name in enumerate(("material_id", "tag_id", "face_id")):
-        images[name] = np.where(shown, ids[..., channel : channel + 1], NO_SURFACE)
-    return {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
 
 
 def _scene_findings(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None) -> list[Finding]:

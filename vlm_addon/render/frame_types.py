@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..core.effects import EffectPlan
 from ..core.errors import InvalidInput
 from ..core.scene import Finding, Float32
 
@@ -20,7 +21,10 @@ class RenderSettings:
     soft lamp, in phase one and at least in the finished picture. buffers: also return every intermediate image.
     world_lights: directions that stand for what the world sends, each with a shadow map; none where it is black.
     Direct light, whose shadows are seen, has up to four times as many with more samples. display: also return the
-    picture as the local tone mapping operator shows it.
+    picture as the local tone mapping operator shows it. effects: "auto", "on" or "off" by name of effect
+    (core/effect_rules.py), and their settings by "EFFECT.SETTING". economical: leave out effects that would change
+    nothing and use again what earlier frames made; otherwise all that is enabled runs anew. plan_only: give the plan of
+    the picture's middle sample, and no picture.
     """
 
     width: int
@@ -33,6 +37,9 @@ class RenderSettings:
     buffers: bool = False
     world_lights: int = 64
     display: bool = False
+    effects: Mapping[str, Any] = field(default_factory=dict)
+    economical: bool = True
+    plan_only: bool = False
 
 
 LIMITS = {
@@ -61,7 +68,8 @@ class Frame:
     images: float32 (h, w, c) linear Rec.709, row 0 at the top; always `combined` (RGBA, premultiplied), `direct` and
     `indirect` (RGB radiance, W/(m² sr)); on demand `display` (RGBA, display-linear in [0, 1]). timings: (pass name,
     milliseconds) in order. counters: what was counted (lights, triangles, samples …). device: name of the device;
-    timer: how milliseconds were taken. reasons: why a pass ran in another way than was asked for.
+    timer: how milliseconds were taken. reasons: why a pass ran in another way than was asked for. plan: which effects
+    ran, what of earlier frames was used again, and why.
     """
 
     images: dict[str, Float32]
@@ -71,3 +79,4 @@ class Frame:
     timer: str
     findings: tuple[Finding, ...] = ()
     reasons: tuple[str, ...] = ()
+    plan: EffectPlan = field(default_factory=EffectPlan)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.errors import DeviceError
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 MAX_MESSAGE_BYTES = 1 << 28
 ALIGNMENT_BYTES = 64
 _LENGTH = struct.Struct("<I")

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from ..core.array_codec import content_hash
-from ..core.occluders import Occlusion, find_occlusion
 from ..core.progress import Progress
 from ..core.scene import Float32
 from ..core.spread_pattern import SIDE
@@ -39,14 +37,6 @@ class VisibilitySettings(Protocol):
     filter: str
     filter_distance: float
     filter_cosine: float
-
-
-def scene_occlusion(scene: SceneInputs) -> Occlusion:
-    """Whether anything may stand between the scene's surfaces, kept over frames."""
-    assert scene.world_lights is not None
-    meshes, points = scene.world.meshes, scene.world_lights.samples.positions
-    key = content_hash([[[mesh.positions, mesh.triangles] for mesh in meshes], points])
-    return scene.kept.get("occlusion", key, lambda: find_occlusion(meshes, points))
 
 
 class OctreeVisibility:

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..core.effects import EffectPlan
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.scene import Float32, SceneSnapshot
+from ..core.scene_facts import TechniqueFacts
 from . import techniques
 from .frame_types import RenderSettings
 from .geometry import GpuGeometry
@@ -22,9 +24,11 @@ from .kept import Kept
 from .light_structures import LightStructures
 from .local_space import LocalSpace
 from .passes.gbuffer import GBuffer
+from .passes.rsm import LampReflections
 from .passes.shadow_map import LampShadows
 from .shader_library import ShaderLibrary
 from .view import View
+from .virtual_lights import GpuVirtualLights
 
 if TYPE_CHECKING:
     import moderngl
@@ -41,7 +45,8 @@ class SceneInputs:
 
     light_mesh: None where the caller gave none. world, world_lights: snapshot and light mesh in world space; space:
     where the others are. structures, kept: what the
-    device keeps over frames. progress: of the work before the first sample.
+    device keeps over frames. progress: of the work before the first sample. plan: of the frame, before there was a
+    picture.
     """
 
     context: moderngl.Context
@@ -58,6 +63,7 @@ class SceneInputs:
     kept: Kept
     settings: RenderSettings
     progress: Progress
+    plan: EffectPlan
 
 
 @dataclass(frozen=True)
@@ -84,15 +90,26 @@ class Technique(ABC):
     settings: ClassVar[type] = NoSettings
     needs_light_mesh: ClassVar[bool] = False
 
+    @classmethod
+    def facts(cls, settings: Any) -> TechniqueFacts:
+        """What it finds by itself with these settings: indirect light that nothing occludes, and effects add what shows
+        in glossy surfaces, unless a technique says otherwise."""
+        return TechniqueFacts(cls.name)
+
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         """Does what is needed once for all samples of a frame. settings: an instance of `settings`.
 
         Raises InvalidInput where the technique needs a light mesh and there is none.
         """
-        if self.needs_light_mesh and not scene.light_mesh:
-            raise InvalidInput(f"technique {self.name!r}", "the scene has no virtual light mesh", "bake one first")
+        self.require_light_mesh(scene.light_mesh)
         self.scene = scene
         self.chosen = settings
+
+    @classmethod
+    def require_light_mesh(cls, light_mesh: VirtualLightMesh | None) -> None:
+        """Raises InvalidInput where the technique needs a light mesh and there is none."""
+        if cls.needs_light_mesh and not light_mesh:
+            raise InvalidInput(f"technique {cls.name!r}", "the scene has no virtual light mesh", "bake one first")
 
     @classmethod
     def known_bias(cls) -> str:
@@ -106,6 +123,14 @@ class Technique(ABC):
     def specular(self) -> moderngl.Texture | None:
         """Radiance in W/(m² sr) that specular layers send to the eye beside direct light, RGBA32F of the G-buffer's
         size; None for none. Asked for after `indirect`, of the same picture; it is in the finished picture alone."""
+        return None
+
+    def reflecting_lights(self) -> tuple[GpuVirtualLights, moderngl.Buffer] | None:
+        """Lights that show in glossy surfaces, and the radiosity of each (vec4, rgb in W/m²); None for none."""
+        return None
+
+    def lamp_maps(self) -> LampReflections | None:
+        """The reflective shadow maps that it has drawn, so that effects draw no others; None for none."""
         return None
 
     def counters(self) -> dict[str, float]:

@@ -21,7 +21,7 @@ class View:
     against the direction of view. is_orthographic: whether all rays run along -backward. clip_distances: nearest and
     farthest depth that shows. rays: (3, 3) float64, of a perspective camera: what leads to depth 1 through the
     window's lower left corner, and by how much that differs for each pixel to the right and up; 0 for an orthographic
-    one.
+    one. jitter: pixels right and up from their centres where the pixels are sampled.
     """
 
     clip_from_local: Float64
@@ -30,6 +30,15 @@ class View:
     is_orthographic: bool
     clip_distances: tuple[float, float]
     rays: Float64
+    jitter: tuple[float, float] = CENTRED
+
+    def camera_uniforms(self) -> dict[str, object]:
+        """What shaders need to know which way the eye is."""
+        return {
+            "camera_position": self.position,
+            "camera_backward": self.backward,
+            "is_orthographic": self.is_orthographic,
+        }
 
     def picture_width(self, width: int) -> tuple[float, float]:
         """How much a picture of `width` pixels shows across, m: at depth 0, and more of it for each m of depth."""
@@ -66,6 +75,7 @@ def make_view(camera: Camera, width: int, height: int, origin: Float64, jitter: 
         is_orthographic=is_orthographic,
         clip_distances=(camera.clip_start, camera.clip_end),
         rays=np.zeros((3, 3)) if is_orthographic else rays,
+        jitter=jitter,
     )
 
 

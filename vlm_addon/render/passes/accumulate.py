@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,9 +21,35 @@ if TYPE_CHECKING:
 
 DIRECT_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
 IRRADIANCE_UNIT = DIRECT_UNIT + 1
-SPECULAR_UNIT = DIRECT_UNIT + 5
 ENVIRONMENT_UNIT = DIRECT_UNIT + 4
-OUTPUTS = ("combined", "direct", "indirect", "irradiance")
+SPECULAR_UNIT = DIRECT_UNIT + 5
+OPENNESS_UNIT = DIRECT_UNIT + 6
+OUTPUTS = ("combined", "direct", "indirect", "irradiance", "specular")
+
+
+@dataclass(frozen=True)
+class PictureLight:
+    """What falls on, and leaves, the surfaces of one picture; textures of the G-buffer's size, None for nothing.
+
+    direct: radiance that lamps send to the eye. irradiance: W/m², indirect. openness: share of that which is not
+    occluded, in r; None for all. specular: radiance of indirect light in glossy surfaces.
+    """
+
+    direct: moderngl.Texture | None = None
+    irradiance: moderngl.Texture | None = None
+    openness: moderngl.Texture | None = None
+    specular: moderngl.Texture | None = None
+
+    def bind(self) -> dict[str, int | float | bool | str]:
+        """Binds what there is; the names by which passes/picture_light.glsl knows it."""
+        defines: dict[str, int | float | bool | str] = {}
+        units = (DIRECT_UNIT, IRRADIANCE_UNIT, OPENNESS_UNIT, SPECULAR_UNIT)
+        for unit, field in zip(units, fields(self), strict=True):
+            texture = getattr(self, field.name)
+            if texture is not None:
+                texture.use(unit)
+                defines[f"{field.name.upper()}_UNIT"] = unit
+        return defines
 
 
 class AccumulatePass:
@@ -53,39 +80,23 @@ class AccumulatePass:
     def add(
         self,
         gbuffer: GBuffer,
-        direct: moderngl.Texture,
-        irradiance: moderngl.Texture | None,
+        light: PictureLight,
         view: View,
         world_radiance: tuple[float, float, float],
         weight: float,
-        specular: moderngl.Texture | None = None,
     ) -> None:
-        """Adds one picture. direct: radiance. irradiance: W/m², None for none. weight: one over the sample count.
-        specular: radiance beside the direct one, likewise; in the combined picture alone."""
-        defines: dict[str, int | bool] = {
-            "DIRECT_UNIT": DIRECT_UNIT,
-            "IRRADIANCE_UNIT": IRRADIANCE_UNIT,
-            "SPECULAR_UNIT": SPECULAR_UNIT,
-        }
-        if irradiance is not None:
-            defines["HAS_INDIRECT"] = True
-            irradiance.use(IRRADIANCE_UNIT)
-        if specular is not None:
-            defines["HAS_SPECULAR"] = True
-            specular.use(SPECULAR_UNIT)
+        """Adds one picture. weight: one over the sample count."""
+        defines = light.bind()
         if self._environment_map is not None:
             defines["ENVIRONMENT_UNIT"] = ENVIRONMENT_UNIT
             self._environment_map.use(ENVIRONMENT_UNIT)
         combine = FullscreenPass(self._context, self._shaders, "passes/accumulate.frag", defines)
         gbuffer.bind()
         self._albedo.bind()
-        direct.use(DIRECT_UNIT)
         set_uniforms(
             combine.program,
             {
-                "camera_position": view.position,
-                "camera_backward": view.backward,
-                "is_orthographic": view.is_orthographic,
+                **view.camera_uniforms(),
                 "world_radiance": world_radiance,
                 "weight": weight,
             },

@@ -51,7 +51,7 @@ class DirectLightPass:
         self._uniforms = uniforms
         self._context = context
         self._shaders = shaders
-        self._variants: dict[tuple[int, int, bool], FullscreenPass] = {}
+        self._variants: dict[tuple[int, int, bool, bool], FullscreenPass] = {}
         self._lamp = context.buffer(reserve=LAMP.dtype.itemsize)
         self._albedo = AlbedoTexture(context)
         self._distances = DistanceRange(context, shaders)
@@ -65,19 +65,18 @@ class DirectLightPass:
         sample_count: int,
         shadow_samples: int,
         light_shares: Float64 | None = None,
+        *,
+        has_highlights: bool = True,
     ) -> moderngl.Texture:
         """Radiance in W/(m² sr) that each pixel sends to the eye, RGBA32F with w 0; 0 where no surface shows.
 
         Over all samples a soft lamp gets at least `shadow_samples` points: few show as steps in its penumbra.
-        light_shares: (n,) weight of each light in this picture, 1 by default. The next call overwrites the texture.
+        light_shares: (n,) weight of each light in this picture, 1 by default. has_highlights: whether lamps show in
+        glossy surfaces. The next call overwrites the texture.
         """
         self._framebuffer.clear()
         self._albedo.bind()
-        camera = {
-            "camera_position": view.position,
-            "camera_backward": view.backward,
-            "is_orthographic": view.is_orthographic,
-        }
+        camera = view.camera_uniforms()
         uses_windows = [shadows.uses_windows(lamp) for lamp in range(len(shadows.lights))]
         windows: tuple[ViewWindow, ...] = (ALL_DISTANCES,)
         if any(uses_windows):
@@ -92,10 +91,10 @@ class DirectLightPass:
                     shadow_map = shadows.shadow_map(lamp, index, sample_count * together, together, part_of_view.window)
                     outer = part_of_view.outer if part_of_view.outer < math.inf else 0.0
                     uniforms = {"weight": shares[lamp] / together, "distances": (outer, part_of_view.inner)}
-                    self._add(gbuffer, shadow_map, camera | uniforms | dict(self._uniforms))
+                    self._add(gbuffer, shadow_map, camera | uniforms | dict(self._uniforms), has_highlights)
         return self.images[0]
 
-    def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, uniforms: dict[str, Any]) -> None:
+    def _add(self, gbuffer: GBuffer, shadow_map: ShadowMap, uniforms: dict[str, Any], has_highlights: bool) -> None:
         # New storage: llvmpipe (Mesa 22) lets a write overtake draws that still read the old one.
         self._lamp.orphan()
         self._lamp.write(shadow_map.record.tobytes())
@@ -103,16 +102,16 @@ class DirectLightPass:
         # Drawing a shadow map binds the materials' textures to the units of the G-buffer.
         gbuffer.bind()
         shadow_map.bind()
-        fullscreen = self._variant(shadow_map.record[0])
+        fullscreen = self._variant(shadow_map.record[0], has_highlights)
         set_uniforms(fullscreen.program, uniforms)
         fullscreen.draw(self._framebuffer, additive=True)
 
-    def _variant(self, lamp: np.void) -> FullscreenPass:
+    def _variant(self, lamp: np.void, has_highlights: bool) -> FullscreenPass:
         """The pass compiled for lamps of this kind."""
-        key = (int(lamp["kind"]), int(lamp["shadow_kind"]), bool(lamp["radius"] > 0.0))
+        key = (int(lamp["kind"]), int(lamp["shadow_kind"]), bool(lamp["radius"] > 0.0), has_highlights)
         if key not in self._variants:
             defines: dict[str, int | float | bool] = dict(
-                zip(("LAMP_KIND", "SHADOW_KIND", "HAS_RADIUS"), key, strict=True)
+                zip(("LAMP_KIND", "SHADOW_KIND", "HAS_RADIUS", "HAS_HIGHLIGHTS"), key, strict=True)
             )
             defines["WINDOW_FADE"] = FADE
             self._variants[key] = FullscreenPass(self._context, self._shaders, self._fragment, defines)

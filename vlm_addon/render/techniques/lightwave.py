@@ -23,6 +23,7 @@ import numpy as np
 from ...core.light_wave import Wave, WaveSettings
 from ...core.progress import Progress
 from ...core.scene import DIFFUSE, Float32
+from ...core.scene_facts import OWN_SPECULAR, TechniqueFacts
 from ...core.settings import OWN, setting
 from ...core.stacked_hemispheres import shadow_map_bytes
 from ..passes.accumulate import read_image
@@ -137,6 +138,11 @@ class LightWave(Technique):
     label = "LightWave"
     description = "Bounced light faked by lights on hemispheres around each lamp; no colour bleeds, nothing is physical"
     settings = Settings
+
+    @classmethod
+    def facts(cls, settings: Any) -> TechniqueFacts:
+        """What it finds by itself."""
+        return TechniqueFacts(cls.name, specular=OWN_SPECULAR, knows_visibility=True)
 
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)

@@ -13,6 +13,7 @@ from ...core.array_codec import content_hash
 from ...core.light_walk import SurfaceMeans, bounce_counts, surface_means
 from ...core.progress import Progress, step
 from ...core.scene import Float32
+from ...core.scene_facts import TechniqueFacts
 from ...core.settings import OWN, setting
 from ..light_marks import marked_lights
 from ..map_settings import MapSettings, map_images
@@ -157,6 +158,11 @@ class ManyLight(Technique):
     description = "Diffuse bounces from point lights on lit surfaces, with rays through a voxel octree"
     settings = Settings
 
+    @classmethod
+    def facts(cls, settings: Any) -> TechniqueFacts:
+        """What it finds by itself."""
+        return TechniqueFacts(cls.name, knows_visibility=True)
+
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         context, shaders, timer = scene.context, scene.shaders, scene.timer
@@ -232,6 +238,10 @@ class ManyLight(Technique):
         key = content_hash([[mesh.positions, mesh.triangles, mesh.reflectance] for mesh in meshes])
         means: SurfaceMeans = self.scene.kept.get("surface_means", key, lambda: surface_means(meshes))
         return means
+
+    def lamp_maps(self) -> LampReflections:
+        """Those that it gathers from."""
+        return self._maps
 
     def counters(self) -> dict[str, float]:
         """Of the last picture: lights; ways asked for at a pixel, and the share of its lights for which none was, as

@@ -186,6 +186,10 @@ class RsmGather(Technique):
         factor: int = self.chosen.low_resolution
         return factor - 1 + factor // 2
 
+    def lamp_maps(self) -> LampReflections:
+        """Those that it gathers from."""
+        return self._maps
+
     def counters(self) -> dict[str, float]:
         """Maps and how many were drawn in this frame; share of the unbounded irradiance that bounds took off in the
         last picture; share of the pixels that were interpolated."""

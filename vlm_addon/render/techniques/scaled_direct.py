@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...core.scene_facts import OWN_SPECULAR, TechniqueFacts
 from ...core.settings import setting
 from ..passes.direct_light import DirectLightPass
 from ..picture_shares import picture_shares
@@ -46,6 +47,11 @@ class ScaledDirect(Technique):
         "Shadows half as dark, through walls too, and all else brighter, in place of a bounce: a cheap fallback"
     )
     settings = Settings
+
+    @classmethod
+    def facts(cls, settings: Any) -> TechniqueFacts:
+        """What it finds by itself."""
+        return TechniqueFacts(cls.name, specular=OWN_SPECULAR)
 
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)

@@ -202,6 +202,10 @@ class SecondOrder(Technique):
         brightest = self._placed.brightest
         return self._passes.of(picked.gbuffer).render(picked.gbuffer, self._lights, negative, brightest, progress)
 
+    def lamp_maps(self) -> LampReflections:
+        """Those that it gathers from."""
+        return self._maps
+
     def counters(self) -> dict[str, float]:
         """Of the last picture: lights; negative lights that take something away and how much, W, mean of the channels;
         shares of the light that they and the bounded term take off. Of the frame: share of pixels for which the low

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.baked_visibility import CELL_COUNTS, MOST_POINTS
+from ...core.effects import SKIP
 from ...core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings
 from ...core.range_grid import RangeSettings
 from ...core.scene import Float32
+from ...core.scene_facts import TechniqueFacts
 from ...core.settings import OWN, setting
 from ..baked_lights import BakedLights
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
-from ..light_visibility import OctreeVisibility, scene_occlusion
+from ..light_visibility import OctreeVisibility
 from ..octree_settings import OctreeSettings
 from ..passes.accumulate import read_image
 from ..passes.filter import FilterSettings
@@ -124,6 +126,12 @@ class VirtualLightMeshTechnique(Technique):
     settings = Settings
     needs_light_mesh = True
 
+    @classmethod
+    def facts(cls, settings: Any) -> TechniqueFacts:
+        """That virtual lights are polygons, and whether something is asked to tell where they are occluded."""
+        asks = settings.visibility != NONE
+        return TechniqueFacts(cls.name, knows_visibility=asks, asks_visibility=asks, has_reflecting_lights=True)
+
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         assert scene.light_mesh is not None
@@ -148,10 +156,9 @@ class VirtualLightMeshTechnique(Technique):
         """What the sum is multiplied by, light by light, if anything need, and why not, if it was asked for."""
         if self.chosen.visibility != BAKED:
             return None, []
-        with self.scene.timer.measure("occluders"):
-            occlusion = scene_occlusion(self.scene)
-        if not occlusion.possible:
-            return None, [f"no visibility is baked: {occlusion.reason}"]
+        decided = self.scene.plan["light_visibility"]
+        if decided.action == SKIP:
+            return None, [f"no visibility is baked: {decided.reason}"]
         return BakedLights(self.scene, self.chosen), []
 
     def _chosen_sum(self, baked: BakedLights | None) -> LightSum:
@@ -167,12 +174,11 @@ class VirtualLightMeshTechnique(Technique):
         """What tells how much of the light gets there, if anything need, and why rays are cast or not, if asked for."""
         if self.chosen.visibility != OCTREE:
             return None, []
-        with self.scene.timer.measure("occluders"):
-            occlusion = scene_occlusion(self.scene)
-        if not occlusion.possible:
-            return None, [f"no visibility rays are cast: {occlusion.reason}"]
+        decided = self.scene.plan["light_visibility"]
+        if decided.action == SKIP:
+            return None, [f"no visibility rays are cast: {decided.reason}"]
         visibility = OctreeVisibility(self.scene, self._sum, self.chosen)
-        return visibility, [f"visibility rays are cast: {occlusion.reason}", *visibility.reasons()]
+        return visibility, [f"visibility rays are cast: {decided.reason}", *visibility.reasons()]
 
     def indirect(self, frame: FrameInputs) -> moderngl.Texture:
         """Sum over the lights of radiosity times form factor, and times what gets there."""
@@ -194,6 +200,10 @@ class VirtualLightMeshTechnique(Technique):
         assert self._unoccluded is not None
         with self.scene.timer.measure("phase two without visibility"):
             return self._unoccluded.render(frame.gbuffer, frame.progress)
+
+    def reflecting_lights(self) -> tuple[GpuVirtualLights, moderngl.Buffer]:
+        """All lights."""
+        return self._lights, self._radiosity
 
     def counters(self) -> dict[str, float]:
         """Virtual lights, which structures were built in this frame (0: kept), what their lists hold, and rays."""

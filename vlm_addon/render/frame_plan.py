@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plan of a frame and of each of its pictures, from the facts of the scene and what the device counted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..core.array_codec import content_hash
+from ..core.effects import EffectPlan, parse_choices, plan_effects
+from ..core.light_mesh import VirtualLightMesh
+from ..core.occluders import Occlusion, find_occlusion
+from ..core.reach import BOUNDED_KINDS
+from ..core.scene import Float64, Light, SceneSnapshot
+from ..core.scene_facts import ScreenFacts, TechniqueFacts, gather_facts, lamp_facts, lamp_sources, lights_picture
+from .frame_types import RenderSettings
+from .kept import Kept
+
+
+class FramePlanner:
+    """Facts of one frame; `plan` is that of all of it so far."""
+
+    def __init__(
+        self,
+        kept: Kept,
+        snapshot: SceneSnapshot,
+        light_mesh: VirtualLightMesh | None,
+        world_lights: Sequence[Light],
+        technique: TechniqueFacts,
+        settings: RenderSettings,
+    ) -> None:
+        """snapshot: in world space. world_lights: suns that stand for its world. Raises InvalidInput for an unknown
+        effect."""
+        self._choices, _ = parse_choices(settings.effects)
+        self._economical = settings.economical
+        self._snapshot = snapshot
+        occlusion, lamp_occlusion = _occlusions(kept, snapshot, light_mesh, world_lights)
+        self._facts = gather_facts(snapshot, light_mesh, technique, occlusion, lamp_occlusion, settings.samples)
+        self.plan = plan_effects(self._facts, self._choices, economical=self._economical)
+        self._pictures = 0
+
+    @property
+    def asks_screen(self) -> bool:
+        """Whether what a picture shows may change what it needs."""
+        bounded = any(lamp.kind in BOUNDED_KINDS for lamp in self._snapshot.lights)
+        return self._economical and bool(self._facts.glossy or bounded)
+
+    def picture(self, screen: ScreenFacts | None) -> EffectPlan:
+        """The plan of the next picture. screen: what it shows, None where nobody has counted."""
+        if screen is None:
+            return self.plan
+        lamps = lamp_facts(self._snapshot, screen)
+        facts = replace(self._facts, screen=screen, lamps=lamps)
+        plan = plan_effects(facts, self._choices, economical=self._economical)
+        self.plan = plan if self._pictures == 0 else self.plan.merged(plan)
+        self._pictures += 1
+        return plan
+
+    def lamp_shares(self, screen: ScreenFacts | None, lights: Sequence[Light], shares: Float64) -> Float64:
+        """`shares`, (n,) weights of `lights` in a picture, 0 for those that light nothing of it."""
+        if screen is None:
+            return shares
+        reach = [max(light.power) > 0.0 and lights_picture(light, screen) for light in lights]
+        return np.where(reach, shares, 0.0)
+
+
+def _occlusions(
+    kept: Kept, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, world_lights: Sequence[Light]
+) -> tuple[Occlusion, Occlusion]:
+    """Between surfaces, and of light from lamps and world, too."""
+    meshes = snapshot.meshes
+    points = None if light_mesh is None else light_mesh.samples.positions
+    key = content_hash([[[mesh.positions, mesh.triangles] for mesh in meshes], points])
+    between = kept.get("occlusion", key, lambda: find_occlusion(meshes, points))
+    if between.possible:
+        return between, between
+    sources, directions = lamp_sources((*snapshot.lights, *world_lights))
+    starts = sources if points is None else np.concatenate([points, sources])
+    lamp_key = content_hash([key, sources, directions])
+    return between, kept.get("lamp_occlusion", lamp_key, lambda: find_occlusion(meshes, starts, directions))
