@@ -17,7 +17,6 @@ from vlm_addon.core.scene import Float32, Mesh, SceneSnapshot
 from vlm_addon.core.settings import describe
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
-from vlm_addon.render.kept import Kept
 from vlm_addon.render.technique import technique_list
 from vlm_addon.render.techniques.vlm_and_rest import OTHERS, WITHOUT_SURFACES, VlmAndRest
 
@@ -195,7 +194,7 @@ def test_where_everything_is_chosen_it_is_the_light_mesh_to_the_bit(device: Devi
 
 def test_a_moving_object_gives_the_picture_of_a_fresh_device_and_leaves_the_rest_as_it_was(device: Device) -> None:
     settings = {"rest": "vlm", "tolerance": 0.05, "vlm_tolerance": 0.05}
-    kept = device.kept.get("rest_of_scene", "", Kept)
+    kept = device.kept.part("rest")
     heights = (0.2, 0.5, 0.9)
     pictures, built = [], []
     for height in heights:

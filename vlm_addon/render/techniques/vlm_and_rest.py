@@ -14,9 +14,9 @@ import numpy as np
 from ...core.bounce_parts import DYNAMIC, TAGGED, Choice, Reflected, reflected, tag_spans, without_bounce
 from ...core.progress import Progress
 from ...core.scene import Float32
+from ...core.scene_facts import OWN_SPECULAR, TechniqueFacts
 from ...core.settings import describe, setting
 from ..device import PassTimer
-from ..kept import Kept
 from ..passes.accumulate import read_image
 from ..passes.phase_two import IrradianceImage
 from ..technique import FrameInputs, SceneInputs, Technique
@@ -32,6 +32,8 @@ from .vlm import VirtualLightMeshTechnique
 if TYPE_CHECKING:
     import moderngl
 
+    from ..virtual_lights import GpuVirtualLights
+
 OTHERS: tuple[type[Technique], ...] = (
     ManyLight,
     RsmGather,
@@ -44,7 +46,7 @@ OTHERS: tuple[type[Technique], ...] = (
 """What the rest may bounce by: every other technique."""
 WITHOUT_SURFACES = (LightWave.name, ScaledDirect.name)
 """Of those, techniques whose light comes from lamps alone: no surface can be taken out of them."""
-CHOSEN, REST = "chosen", "rest"
+CHOSEN, REST, SHOWN = "chosen", "rest", "shown"
 MOST_APART = 2.0
 """Times that chosen lights may reflect more, or less, than chosen surfaces before it is told."""
 GROUP_SIDE = 8
@@ -101,6 +103,13 @@ def _own_name(technique: type[Technique], name: str) -> str:
     return f"{technique.name}_{name}"
 
 
+def _second(settings: Any) -> tuple[type[Technique], Any]:
+    """The technique of the rest and its own settings."""
+    technique = next(technique for technique in OTHERS if technique.name == settings.rest)
+    own = {info.name: getattr(settings, _own_name(technique, info.name)) for info in describe(technique.settings)}
+    return technique, technique.settings(**own)
+
+
 Settings = dataclasses.make_dataclass("Settings", _settings_of_others(), bases=(Division,), frozen=True)
 
 
@@ -119,6 +128,19 @@ class VlmAndRest(Technique):
     settings = Settings
     needs_light_mesh = True
 
+    @classmethod
+    def facts(cls, settings: Any) -> TechniqueFacts:
+        """Those of both parts: where one of them knows what is occluded, nothing else may darken the sum."""
+        second, own = _second(settings)
+        chosen, rest = VirtualLightMeshTechnique.facts(settings), second.facts(own)
+        return replace(
+            chosen,
+            name=cls.name,
+            knows_visibility=chosen.knows_visibility or rest.knows_visibility,
+            asks_visibility=chosen.asks_visibility or rest.asks_visibility,
+            specular=rest.specular if rest.specular == OWN_SPECULAR else chosen.specular,
+        )
+
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         assert scene.light_mesh is not None
@@ -127,7 +149,8 @@ class VlmAndRest(Technique):
         self._reflected = reflected(scene.world, scene.world_lights, choice)
         self._parts: dict[str, Technique] = {}
         self._found: dict[str, moderngl.Texture] = {}
-        second = next(technique for technique in OTHERS if technique.name == settings.rest)
+        self._shown: tuple[GpuVirtualLights, moderngl.Buffer] | None = None
+        second, own = _second(settings)
         chosen_progress, rest_progress = _halves(scene.progress)
         if self._reflected.lights:
             inputs = replace(_chosen_inputs(scene, choice), progress=chosen_progress)
@@ -135,8 +158,7 @@ class VlmAndRest(Technique):
         inputs = replace(_rest_inputs(scene, choice), progress=rest_progress)
         self._has_rest = _has_rest(second, self._reflected, inputs)
         if self._has_rest:
-            own = {info.name: getattr(settings, _own_name(second, info.name)) for info in describe(second.settings)}
-            self._parts[REST] = second(inputs, second.settings(**own))
+            self._parts[REST] = second(inputs, own)
         size = scene.settings.width, scene.settings.height
         self._sum = IrradianceImage(scene.context, *size)
         self._add = scene.shaders.compute("techniques/vlm_and_rest.comp", {"GROUP_SIDE": GROUP_SIDE})
@@ -162,6 +184,14 @@ class VlmAndRest(Technique):
     def specular(self) -> moderngl.Texture | None:
         """That of the other technique."""
         return self._parts[REST].specular() if REST in self._parts else None
+
+    def reflecting_lights(self) -> tuple[GpuVirtualLights, moderngl.Buffer] | None:
+        """All lights of the light mesh: no diffuse light is counted twice by what shows in glossy surfaces."""
+        if self._shown is None:
+            kept = self.scene.kept.part(SHOWN)
+            inputs = replace(self.scene, kept=kept, timer=_PartTimer(self.scene.timer, SHOWN))
+            self._shown = VirtualLightMeshTechnique(inputs, vlm.Settings(lights=vlm.ALL)).reflecting_lights()
+        return self._shown
 
     def counters(self) -> dict[str, float]:
         """Chosen triangles; those of each part."""
@@ -214,7 +244,7 @@ def _chosen_inputs(scene: SceneInputs, choice: Choice) -> SceneInputs:
 def _rest_inputs(scene: SceneInputs, choice: Choice) -> SceneInputs:
     """The scene whose chosen surfaces bounce nothing, without their lights. What is kept for it is kept apart, so that
     neither part makes the other's anew with each frame."""
-    kept = scene.kept.get("rest_of_scene", "", Kept)
+    kept = scene.kept.part(REST)
     return replace(
         _with_lights(scene, choice, is_chosen=False),
         timer=_PartTimer(scene.timer, REST),
