@@ -48,7 +48,8 @@ class History:
     """What one picture leaves for the next. seen: the view and space of that picture, None while there is none.
 
     irradiance: RGBA32F, the mean. place: RGBA32F, in local units of its space, and the number of pictures in the mean.
-    normal: RGBA16F. step: pictures since the history began.
+    normal: RGBA16F. key: hash of all without which it means nothing; scene_key: of what else it depends on. step:
+    pictures since the history began.
     """
 
     def __init__(self, context: moderngl.Context, width: int, height: int) -> None:
@@ -56,7 +57,7 @@ class History:
         self.irradiance, self.place = (context.texture(size, 4, dtype="f4") for _ in range(2))
         self.normal = context.texture(size, 4, dtype="f2")
         self.seen: tuple[View, LocalSpace] | None = None
-        self.lights_key = ""
+        self.key = ""
         self.scene_key = ""
         self.step = 0
 
@@ -115,13 +116,13 @@ class TemporalPass:
         The next call overwrites the texture.
         """
         history = self._history
-        if history.lights_key != lights_key or (limit == 0.0 and history.scene_key != scene_key):
+        if history.key != lights_key or (limit == 0.0 and history.scene_key != scene_key):
             history.seen, history.step = None, 0
         self._picture = _Picture(view, space, lights_key, scene_key)
         most = 0.0 if history.seen is None else limit if history.scene_key != scene_key else LARGEST
         uniforms: dict[str, object] = {"most_age": most}
         if history.seen is not None:
-            uniforms |= _into_history(space, *history.seen, gbuffer.size[0])
+            uniforms |= into_history(space, *history.seen, gbuffer.size[0])
         gbuffer.bind()
         for unit, texture in enumerate((history.irradiance, history.place, history.normal), FIRST_UNIT):
             texture.use(unit)
@@ -159,7 +160,7 @@ class TemporalPass:
         self._blend.run(*self._groups)
         self._context.memory_barrier()
         history.seen = picture.view, picture.space
-        history.lights_key, history.scene_key = picture.lights_key, picture.scene_key
+        history.key, history.scene_key = picture.lights_key, picture.scene_key
         history.step += 1
         return self._result
 
@@ -168,7 +169,7 @@ class TemporalPass:
         return {"history_age": np.ascontiguousarray(read_image(self._history.place)[..., 3:])}
 
 
-def _into_history(space: LocalSpace, view: View, history_space: LocalSpace, width: int) -> dict[str, object]:
+def into_history(space: LocalSpace, view: View, history_space: LocalSpace, width: int) -> dict[str, object]:
     """Uniforms that lead from a place in `space` into a picture of `width` pixels through `view`, in its own space."""
     scale, offset = space.to(history_space)
     at_0, per_depth = view.picture_width(width)

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The mean of what this picture found and what earlier ones did, kept for the next; earlier ones held near to what the
+// neighbourhood has now where something changes (variance clipping: Salvi 2016).
+#include "passes/gbuffer_samplers.glsl"
+
+layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
+
+layout(binding = FOUND_UNIT) uniform sampler2D found_now;
+layout(binding = REPROJECTED_UNIT) uniform sampler2D reprojected;
+layout(binding = AGE_UNIT) uniform sampler2D age;
+layout(std430, binding = COUNT_BINDING) readonly buffer Counts { uint shown_pixels, near_pixels; };
+layout(rgba32f, binding = 0) writeonly uniform image2D history_value;
+layout(rgba32f, binding = 1) writeonly uniform image2D history_place;
+layout(rgba16f, binding = 2) writeonly uniform image2D history_normal;
+layout(rgba32f, binding = 3) writeonly uniform image2D result;
+
+uniform float most_age;
+uniform float clamp_width;      // standard deviations; 0 takes earlier pictures as they are
+uniform float cut_share;        // of the surface's pixels must have a history near by, or none counts
+uniform float pixel_at_0, pixel_per_depth; // a pixel's size: pixel_at_0 + pixel_per_depth x depth
+
+#define REACH 2                 // pixels to each side that are the neighbourhood
+#define LEAST_NEIGHBOURS 4      // of fewer, mean and deviation say nothing
+
+bool is_usable(vec4 value) {
+    // As whole numbers: drivers may take any comparison with NaN for true.
+    return all(lessThan(floatBitsToUint(value) & 0x7fffffffu, uvec4(floatBitsToUint(1e17))));
+}
+
+bool is_same_surface(ivec2 pixel, ivec2 other) {
+    vec4 here = texelFetch(gbuffer_position, pixel, 0);
+    vec3 between = texelFetch(gbuffer_position, other, 0).xyz - here.xyz;
+    vec3 plane = texelFetch(gbuffer_geometric_normal, pixel, 0).xyz;
+    float reach = pixel_at_0 + pixel_per_depth * here.w;
+    return pixel_shows_geometry(other) && abs(dot(between, plane)) < reach
+        && dot(texelFetch(gbuffer_shading_normal, other, 0).xyz, texelFetch(gbuffer_shading_normal, pixel, 0).xyz)
+            > SAME_NORMAL_COSINE;
+}
+
+// `earlier` held within clamp_width standard deviations of the mean of what pixels of one surface found around `pixel`.
+vec4 held(ivec2 pixel, vec4 earlier) {
+    vec4 sum = vec4(0.0);
+    vec4 squares = vec4(0.0);
+    float count = 0.0;
+    vec4 origin = texelFetch(found_now, pixel, 0);
+    for (int y = -REACH; y <= REACH; ++y) {
+        for (int x = -REACH; x <= REACH; ++x) {
+            ivec2 other = pixel + ivec2(x, y);
+            bool is_inside = all(greaterThanEqual(other, ivec2(0))) && all(lessThan(other, imageSize(result)));
+            if (is_inside && is_same_surface(pixel, other)) {
+                vec4 value = texelFetch(found_now, other, 0);
+                if (is_usable(value)) {
+                    // From the pixel's own: squares of large equal values would cancel.
+                    value -= origin;
+                    sum += value;
+                    squares += value * value;
+                    count += 1.0;
+                }
+            }
+        }
+    }
+    if (count < float(LEAST_NEIGHBOURS)) {
+        return earlier;
+    }
+    vec4 mean = sum / count;
+    vec4 deviation = clamp_width * sqrt(max(squares - sum * mean, 0.0) / (count - 1.0));
+    return clamp(earlier, origin + mean - deviation, origin + mean + deviation);
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(result)))) {
+        return;
+    }
+    vec4 mean = vec4(0.0);
+    float pictures = 0.0;
+    if (pixel_shows_geometry(pixel)) {
+        vec4 now = texelFetch(found_now, pixel, 0);
+        float before = texelFetch(age, pixel, 0).x;
+        if (float(near_pixels) < cut_share * float(shown_pixels)) {
+            before = 0.0;
+        }
+        vec4 earlier = texelFetch(reprojected, pixel, 0);
+        if (!is_usable(now)) {
+            mean = before > 0.0 ? earlier : vec4(0.0);
+            pictures = before;
+        } else {
+            if (before > 0.0 && clamp_width > 0.0) {
+                vec4 kept = held(pixel, earlier);
+                // What had to be changed is no mean of anything: it counts as one picture.
+                before = kept == earlier ? before : 1.0;
+                earlier = kept;
+            }
+            mean = max(before > 0.0 ? mix(earlier, now, 1.0 / (before + 1.0)) : now, 0.0);
+            pictures = min(before + 1.0, most_age);
+        }
+    }
+    imageStore(history_value, pixel, mean);
+    imageStore(history_place, pixel, vec4(texelFetch(gbuffer_position, pixel, 0).xyz, pictures));
+    imageStore(history_normal, pixel, vec4(texelFetch(gbuffer_shading_normal, pixel, 0).xyz, 0.0));
+    imageStore(result, pixel, mean);
+}
