@@ -22,15 +22,16 @@ from .finished_images import display_image, finished_images, surface_images
 from .frame_effects import FrameEffects, effect_settings
 from .frame_plan import FramePlanner
 from .frame_types import Frame, RenderSettings, require_in_range
-from .geometry import GpuGeometry
 from .kept import Kept
+from .kept_geometry import kept_geometry
 from .local_space import LocalSpace, make_local_space
 from .passes.accumulate import AccumulatePass, PictureLight, jitter_offsets
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
 from .passes.screen_census import ScreenCensusPass
-from .passes.shadow_map import LampShadows
+from .passes.shadow_map import LampShadows, StillLamps
 from .picture_shares import direct_world_lights, picture_shares
+from .shadow_casters import ShadowCasters
 from .technique import FrameInputs, SceneInputs, technique_by_name
 from .view import make_view, require_usable
 
@@ -91,8 +92,10 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
     local, camera = _localised(space, lit)
     step(progress, 0.0, "geometry")
     with timer.measure("geometry"):
-        geometry = GpuGeometry(context, local, np.zeros(3))
-    shadows = LampShadows(context, shaders, geometry, _casting(local.lights, plan), settings.shadow_resolution)
+        geometry = kept_geometry(context, stage.kept, lit, space)
+    still = StillLamps(ShadowCasters(context, stage.kept, lit), stage.kept, lit.lights, space)
+    cast = _casting(local.lights, plan)
+    shadows = LampShadows(context, shaders, geometry, cast, settings.shadow_resolution, still)
     # A sun is the same in every space.
     direct_shadows = shadows.for_lights((*shadows.lights[:lamps], *_casting(direct_world, plan)))
     scene = SceneInputs(

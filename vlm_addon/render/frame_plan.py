@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.array_codec import content_hash
 from ..core.effects import EffectPlan, parse_choices, plan_effects
 from ..core.light_mesh import VirtualLightMesh
 from ..core.occluders import Occlusion, find_occlusion
@@ -72,11 +71,11 @@ def _occlusions(
     """Between surfaces, and of light from lamps and world, too."""
     meshes = snapshot.meshes
     points = None if light_mesh is None else light_mesh.samples.positions
-    key = content_hash([[[mesh.positions, mesh.triangles] for mesh in meshes], points])
+    key = kept.digests.of([[mesh.positions, mesh.triangles] for mesh in meshes], points)
     between = kept.get("occlusion", key, lambda: find_occlusion(meshes, points))
     if between.possible:
         return between, between
     sources, directions = lamp_sources((*snapshot.lights, *world_lights))
     starts = sources if points is None else np.concatenate([points, sources])
-    lamp_key = content_hash([key, sources, directions])
+    lamp_key = kept.digests.of(key, sources, directions)
     return between, kept.get("lamp_occlusion", lamp_key, lambda: find_occlusion(meshes, starts, directions))
