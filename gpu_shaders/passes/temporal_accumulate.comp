@@ -15,6 +15,7 @@ layout(rgba16f, binding = 2) writeonly uniform image2D history_normal;
 layout(rgba32f, binding = 3) writeonly uniform image2D result;
 
 uniform float most_age;
+uniform float pictures_of_frame; // so far, with this one
 uniform float clamp_width;      // standard deviations; 0 takes earlier pictures as they are
 uniform float cut_share;        // of the surface's pixels must have a history near by, or none counts
 uniform float pixel_at_0, pixel_per_depth; // a pixel's size: pixel_at_0 + pixel_per_depth x depth
@@ -67,12 +68,18 @@ vec4 held(ivec2 pixel, vec4 earlier) {
     return clamp(earlier, origin + mean - deviation, origin + mean + deviation);
 }
 
+// Between a history, which may be anything where it does not count, and what is found now.
+vec4 mixed(vec4 earlier, vec4 now, float share) {
+    return share < 1.0 ? mix(earlier, now, share) : now;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(result)))) {
         return;
     }
     vec4 mean = vec4(0.0);
+    vec4 shown = vec4(0.0);
     float pictures = 0.0;
     if (pixel_shows_geometry(pixel)) {
         vec4 now = texelFetch(found_now, pixel, 0);
@@ -83,6 +90,7 @@ void main() {
         vec4 earlier = texelFetch(reprojected, pixel, 0);
         if (!is_usable(now)) {
             mean = before > 0.0 ? earlier : vec4(0.0);
+            shown = mean;
             pictures = before;
         } else {
             if (before > 0.0 && clamp_width > 0.0) {
@@ -91,12 +99,16 @@ void main() {
                 before = kept == earlier ? before : 1.0;
                 earlier = kept;
             }
-            mean = max(before > 0.0 ? mix(earlier, now, 1.0 / (before + 1.0)) : now, 0.0);
-            pictures = min(before + 1.0, most_age);
+            pictures = before + 1.0;
+            mean = max(mixed(earlier, now, 1.0 / pictures), 0.0);
+            // The frame averages what its pictures show. Weights that grow make its average the mean of all pictures,
+            // of this frame and before: so much of this one as to bring k times the mean of k - 1 pictures to k's.
+            shown = max(mixed(earlier, now, min(pictures_of_frame / pictures, 1.0)), 0.0);
+            pictures = min(pictures, most_age);
         }
     }
     imageStore(history_value, pixel, mean);
     imageStore(history_place, pixel, vec4(texelFetch(gbuffer_position, pixel, 0).xyz, pictures));
     imageStore(history_normal, pixel, vec4(texelFetch(gbuffer_shading_normal, pixel, 0).xyz, 0.0));
-    imageStore(result, pixel, mean);
+    imageStore(result, pixel, shown);
 }

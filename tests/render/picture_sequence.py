@@ -27,8 +27,8 @@ WIDTH, HEIGHT = 48, 36
 @dataclass(frozen=True)
 class Picture:
     """(h, w, …), row 0 at the top. places: m in world space. shown: whether a surface is. faces: their numbers. mean:
-    RGBA. age: pictures in it. before: where surfaces were, m in world space, and normal, plane then; None where nothing
-    moved; known: whether they were."""
+    RGBA, what is shown. age: pictures in the mean that is kept. before: where surfaces were, m in world space, and
+    normal, plane then; None where nothing moved; known: whether they were."""
 
     places: Float64
     shown: np.ndarray
@@ -68,6 +68,7 @@ class PictureSequence:
         follows_eye: bool = False,
         with_motion: bool = True,
         owner: str = "test",
+        sample_index: int = 0,
         **settings: float,
     ) -> Picture:
         """The next picture, of a frame of its own. with_motion: whether the accumulator hears of it. settings: of
@@ -92,7 +93,7 @@ class PictureSequence:
                 context, shaders, self.kept, owner, width, height, chosen, follows_eye=follows_eye
             )
             given = motion if with_motion else None
-            mean = accumulator.render(gbuffer, view, space, upload, key, scene_key, given)
+            mean = accumulator.render(gbuffer, view, space, upload, key, scene_key, given, sample_index)
             surfaces = motion.surfaces
             before = None if surfaces is None else read_image(surfaces.place)
             return Picture(

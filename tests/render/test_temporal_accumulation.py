@@ -87,6 +87,20 @@ def test_a_scene_that_stands_still_goes_to_the_mean_of_all_pictures(sequence: Pi
     assert not picture.mean[~picture.shown].any()
 
 
+def test_the_pictures_of_a_frame_average_to_the_mean_of_all(sequence: PictureSequence) -> None:
+    """Of this frame's and of those before. The pictures of a first frame show what they found, to the bit."""
+    values = [noise(index) for index in range(8)]
+    shown = []
+    for index in range(8):
+        picture = sequence.picture(box_room(), given(values[index]), sample_index=index % 4, **LONG)
+        shown.append(picture.mean)
+    for index in range(4):
+        np.testing.assert_array_equal(shown[index][picture.shown], values[index].astype(np.float32)[picture.shown])
+    np.testing.assert_allclose(
+        np.mean(shown[4:], axis=0)[picture.shown], np.mean(values, axis=0)[picture.shown], atol=3e-6
+    )
+
+
 def test_the_mean_counts_no_more_pictures_than_it_is_told(sequence: PictureSequence) -> None:
     for _ in range(6):
         sequence.picture(box_room(), constant(1.0), history=4)

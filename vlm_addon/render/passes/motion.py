@@ -73,7 +73,7 @@ class MotionPass:
     ) -> None:
         """world: the frame's scene in world space. space: of its G-buffers."""
         self._context = context
-        self._places: MeshPlaces = kept.get("mesh_places", "", MeshPlaces)
+        self._places: MeshPlaces = kept.hold("mesh_places", MeshPlaces)
         self._world = world
         self._space = space
         self._size = width, height

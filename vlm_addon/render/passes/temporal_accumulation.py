@@ -110,10 +110,12 @@ class Accumulator:
         self._shaders = shaders
         self._settings = settings
         self._follows_eye = follows_eye
-        self._history: AccumulatedHistory = kept.get(
-            f"{owner}_accumulated", f"{width} x {height}", lambda: AccumulatedHistory(context, width, height)
-        )
         size = (width, height)
+        histories: dict[tuple[int, int], AccumulatedHistory] = kept.hold(f"{owner}_accumulated", dict)
+        if size not in histories:
+            histories.clear()
+            histories[size] = AccumulatedHistory(context, width, height)
+        self._history = histories[size]
         self._reprojected, self._result = (context.texture(size, 4, dtype="f4") for _ in range(2))
         self._age = context.texture(size, 1, dtype="f4")
         self._counts = context.buffer(bytes(8))
@@ -136,20 +138,25 @@ class Accumulator:
         key: str,
         scene_key: str = "",
         motion: Motion | None = None,
+        sample_index: int = 0,
     ) -> moderngl.Texture:
-        """The mean of `found` and of the history, RGBA32F, finite and at least 0, 0 where no surface shows.
+        """What to show of `found` and of the history, RGBA32F, finite and at least 0, 0 where no surface shows.
+
+        The average over the pictures of a frame is the mean of all that counts; with one picture a frame, so is the
+        result; without any history it is `found` itself.
 
         gbuffer, view, space: of the picture. found: of the picture's size, float, from one to four channels. key: hash
         of all without which the history means nothing (settings of the effect). scene_key: hash of what else the
         values depend on, but for the places of surfaces if there is motion. motion: of the same picture; without,
-        surfaces are taken to stand still. The next call overwrites the texture.
+        surfaces are taken to stand still. sample_index: of the picture in its frame. The next call overwrites the
+        texture.
         """
         history = self._history
         if history.key != key or (motion is not None and history.picture < motion.scene.since):
             history.seen = None
         is_settled = self._note_changes(view, space, scene_key, motion)
         self._reproject(gbuffer, view, space, motion, LARGEST if is_settled else self._settings.changing_history)
-        self._blend(gbuffer, view, found, 0.0 if is_settled else self._settings.clamp)
+        self._blend(gbuffer, view, found, 0.0 if is_settled else self._settings.clamp, sample_index)
         history.seen = view, space
         history.key, history.scene_key = key, scene_key
         history.picture = motion.scene.picture if motion is not None else 0
@@ -203,7 +210,9 @@ class Accumulator:
         shader.run(*self._groups)
         self._context.memory_barrier()
 
-    def _blend(self, gbuffer: GBuffer, view: View, found: moderngl.Texture, clamp_width: float) -> None:
+    def _blend(
+        self, gbuffer: GBuffer, view: View, found: moderngl.Texture, clamp_width: float, sample_index: int
+    ) -> None:
         """Fills the result and the history."""
         history = self._history
         units = {f"{name}_UNIT": FIRST_UNIT + index for index, name in enumerate(("FOUND", "REPROJECTED", "AGE"))}
@@ -215,6 +224,7 @@ class Accumulator:
         uniforms = {
             "most_age": self._settings.history,
             "clamp_width": clamp_width,
+            "pictures_of_frame": 1.0 + sample_index,
             "cut_share": self._settings.cut_share,
             **_pixel_sizes(view, gbuffer),
         }
