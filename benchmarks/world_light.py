@@ -29,7 +29,8 @@ from vlm_addon.core.world_light import world_lights
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.render.geometry import GpuGeometry
-from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
+from vlm_addon.render.lit_lights import radiosity_of
+from vlm_addon.render.passes.phase_one import PhaseOnePass
 from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.terminal import table
 
@@ -115,8 +116,9 @@ def phase_one_rows(
         with device.current() as context:
             geometry = GpuGeometry(context, snapshot)
             shadows = LampShadows(context, device.shaders, geometry, lights, RenderSettings.shadow_resolution)
-            buffer = PhaseOnePass(context, device.shaders).render(light_mesh, geometry.origin, shadows, 1)
-            return read_radiosity(buffer, len(light_mesh)).astype(np.float64)
+            phase_one, lamps = PhaseOnePass(context, device.shaders), range(len(lights))
+            falls = phase_one.render(light_mesh, geometry.origin, shadows, lamps, 1)
+            return radiosity_of(light_mesh, falls).astype(np.float64)
 
     truth, areas = radiosity(TRUTH_FACTOR * max(counts)), light_mesh.areas[:, None]
     for count in counts:

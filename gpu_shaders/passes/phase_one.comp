@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Adds to each virtual light what it reflects of one sample of one lamp (seed 002, 3.2).
+// Adds to each virtual light what falls on it from one sample of one lamp (seed 002, 3.2).
 #include "gpu_layout/SourceSample"
-#include "gpu_layout/SourceLight"
 #include "lib/lights.glsl"
 #include "lib/shadow.glsl"
 
@@ -12,8 +11,9 @@ layout(local_size_x = GROUP_SIZE) in;
 
 layout(std430, binding = LAMP_BINDING) readonly buffer Lamps { Lamp lamps[]; };
 layout(std430, binding = SOURCE_SAMPLE_BINDING) readonly buffer SourceSamples { SourceSample source_samples[]; };
-layout(std430, binding = SOURCE_LIGHT_BINDING) readonly buffer SourceLights { SourceLight source_lights[]; };
-layout(std430, binding = RADIOSITY_BINDING) buffer Radiosities { vec4 radiosities[]; }; // W/m², w unused
+// Where the samples of each light begin and, at last, end.
+layout(std430, binding = SOURCE_LIGHT_BINDING) readonly buffer SourceOffsets { int source_offsets[]; };
+layout(std430, binding = RESULT_BINDING) buffer Irradiances { vec4 irradiances[]; }; // W/m², w unused
 layout(binding = SHADOW_MAP_UNIT) uniform sampler2D shadow_map;
 
 uniform float share;        // of the lamp that this sample stands for
@@ -26,9 +26,8 @@ void main() {
         return;
     }
     Lamp lamp = lamps[0];
-    SourceLight light = source_lights[index];
     vec3 irradiance = vec3(0.0);
-    for (int i = light.first_sample; i < light.end_sample; ++i) {
+    for (int i = source_offsets[index]; i < source_offsets[index + 1]; ++i) {
         SourceSample source = source_samples[i];
         if (window >= 0 && source.window != window) {
             continue;
@@ -38,5 +37,5 @@ void main() {
             irradiance += source.weight * lit_share(shadow_map, lamp, source.position, source.normal, NORMAL_TILT) * unshadowed;
         }
     }
-    radiosities[index].rgb += share * light.reflectance * irradiance;
+    irradiances[index].rgb += share * irradiance;
 }

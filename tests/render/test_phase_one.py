@@ -13,7 +13,8 @@ from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh, empty_lig
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Light, Material, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
-from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
+from vlm_addon.render.lit_lights import radiosity_of
+from vlm_addon.render.passes.phase_one import PhaseOnePass
 from vlm_addon.render.passes.shadow_map import LampShadows
 
 POWER = (10.0, 20.0, 30.0)
@@ -81,8 +82,8 @@ def radiosity(
     with device.current() as context:
         geometry = GpuGeometry(context, snapshot)
         shadows = LampShadows(context, device.shaders, geometry, lights, resolution)
-        buffer = PhaseOnePass(context, device.shaders).render(mesh, geometry.origin, shadows, shadow_samples)
-        return read_radiosity(buffer, len(mesh))
+        phase_one, lamps = PhaseOnePass(context, device.shaders), range(len(lights))
+        return radiosity_of(mesh, phase_one.render(mesh, geometry.origin, shadows, lamps, shadow_samples))
 
 
 def expected_radiosity(irradiance: np.ndarray) -> np.ndarray:

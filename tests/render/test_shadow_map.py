@@ -13,7 +13,7 @@ from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, Material, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
-from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
+from vlm_addon.render.passes.phase_one import PhaseOnePass
 from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass
 from vlm_addon.render.shadow_views import shadow_kind
 
@@ -107,8 +107,8 @@ def lit(
     with device.current() as context:
         geometry = GpuGeometry(context, snapshot)
         shadows = LampShadows(context, device.shaders, geometry, snapshot.lights, RESOLUTION)
-        buffer = PhaseOnePass(context, device.shaders).render(probes(points, normals), geometry.origin, shadows, 16)
-        found = read_radiosity(buffer, len(points))[:, 0]
+        phase_one = PhaseOnePass(context, device.shaders)
+        found = phase_one.render(probes(points, normals), geometry.origin, shadows, [0], 16)[:, 0]
     full = lamp_irradiance(light, points, normals)[:, 0]
     assert (full > 0.0).all()
     return found / full

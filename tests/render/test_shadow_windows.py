@@ -17,7 +17,7 @@ from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.passes import direct_light
 from vlm_addon.render.passes.distance_range import DistanceRange
 from vlm_addon.render.passes.gbuffer import GBufferPass
-from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
+from vlm_addon.render.passes.phase_one import PhaseOnePass
 from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.render.shadow_windows import FADE, WHOLE_SCENE, sample_windows, view_windows
 from vlm_addon.render.view import make_view
@@ -209,7 +209,6 @@ def test_small_virtual_lights_are_shadowed_by_small_things(device: Device, heigh
     with device.current() as context:
         geometry = GpuGeometry(context, scene)
         shadows = LampShadows(context, device.shaders, geometry, scene.lights, 1024)
-        buffer = PhaseOnePass(context, device.shaders).render(lights, geometry.origin, shadows, 4)
-        found = read_radiosity(buffer, len(lights))[:, 0]
+        found = PhaseOnePass(context, device.shaders).render(lights, geometry.origin, shadows, [0], 4)[:, 0]
     np.testing.assert_allclose(found[:40], 0.0, atol=1e-6)
     np.testing.assert_allclose(found[40:], 0.8 * np.pi, rtol=1e-4)

@@ -18,7 +18,8 @@ from vlm_addon.core.world_light import world_lights
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.render.geometry import GpuGeometry
-from vlm_addon.render.passes.phase_one import PhaseOnePass, read_radiosity
+from vlm_addon.render.lit_lights import radiosity_of
+from vlm_addon.render.passes.phase_one import PhaseOnePass
 from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.render.picture_shares import picture_shares
 from vlm_addon.render.view import make_view
@@ -135,8 +136,8 @@ def test_phase_one_measures_the_sky_that_is_seen(device: Device, house: str) -> 
     with device.current() as context:
         geometry = GpuGeometry(context, scene)
         shadows = LampShadows(context, device.shaders, geometry, scene.lights, 512)
-        buffer = PhaseOnePass(context, device.shaders).render(lights, geometry.origin, shadows, 1)
-        found = read_radiosity(buffer, 4)
+        phase_one, lamps = PhaseOnePass(context, device.shaders), range(len(scene.lights))
+        found = radiosity_of(lights, phase_one.render(lights, geometry.origin, shadows, lamps, 1))
     wanted = np.broadcast_to(0.5 * irradiance * np.array(RADIANCE), found.shape)
     assert found == pytest.approx(wanted, rel=0.04)
 
@@ -185,9 +186,10 @@ def test_a_world_that_means_nothing_is_refused(device: Device) -> None:
 def test_lights_of_the_world_are_kept_over_frames(device: Device) -> None:
     scene = under_the_sky(FLOOR, world_radiance=(0.125, 0.5, 0.75))
     first = device.render(scene, None, settings()).images["direct"]
-    built = dict(device.kept.built)
+    kinds = ("world_lights", "direct_world_lights")
+    built = [device.kept.built[kind] for kind in kinds]
     second = device.render(replace(scene, camera=facing_camera(2.5)), None, settings()).images["direct"]
-    assert device.kept.built == built
+    assert [device.kept.built[kind] for kind in kinds] == built
     assert second == pytest.approx(first, rel=1e-3)
 
 

@@ -180,9 +180,6 @@ SOURCE_SAMPLE = GpuStruct(
 """A point on the visible surface where phase one measures irradiance; position in m from the local origin; window: of
 a sun's shadow map that shows it best."""
 
-SOURCE_LIGHT = GpuStruct("SourceLight", (("vec3", "reflectance"), ("int", "first_sample"), ("int", "end_sample")))
-"""What phase one needs of a virtual light; reflectance: colour times strength."""
-
 HALF_BALL = GpuStruct(
     "HalfBall",
     (("vec3", "centre"), ("float", "radius_squared"), ("vec3", "normal"), ("vec3", "inverse_normal")),
@@ -262,7 +259,6 @@ STRUCTS: dict[str, GpuStruct] = {
         MATERIAL,
         LAMP,
         SOURCE_SAMPLE,
-        SOURCE_LIGHT,
         HALF_BALL,
         POINT_GROUP,
         LIGHT_NODE,

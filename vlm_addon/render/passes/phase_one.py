@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Radiosity of the virtual lights from the lamps."""
+"""What falls on the virtual lights from the lamps."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from ...core.errors import DeviceError
 from ...core.light_mesh import VirtualLightMesh
 from ...core.progress import Progress, silent, step
 from ...core.scene import Float32, Float64
-from ..gpu_layout import CONSTANTS, LAMP, SOURCE_LIGHT, SOURCE_SAMPLE
+from ..gpu_layout import CONSTANTS, LAMP, SOURCE_SAMPLE
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..shadow_windows import WHOLE_SCENE, ShadowWindow, sample_windows
 from .shadow_map import LampShadows
@@ -24,7 +25,7 @@ ANY_WINDOW = -1
 
 
 class PhaseOnePass:
-    """Irradiance at the source samples of each virtual light, turned into radiosity (seed 002, 3.2)."""
+    """Irradiance at the source samples of each virtual light (seed 002, 3.2)."""
 
     def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
         self._context = context
@@ -36,29 +37,28 @@ class PhaseOnePass:
         light_mesh: VirtualLightMesh,
         origin: Float64,
         shadows: LampShadows,
+        lamps: Sequence[int],
         shadow_samples: int,
         progress: Progress = silent,
-    ) -> moderngl.Buffer:
-        """One vec4 a light: rgb = strength (emission + colour x irradiance) in W/m², w 0.
+    ) -> Float32:
+        """(n, 3) float32 W/m²: what falls on each light from `lamps`, rows of `shadows.lights`.
 
-        Irradiance is the weighted mean over the light's source samples, each with its own shadows; soft lamps are
-        the mean over `shadow_samples` points. origin: (3,) float64, the geometry's. Raises DeviceError where the
-        samples do not fit the device, Cancelled when `progress` says so.
+        The weighted mean over the light's source samples, each with its own shadows; soft lamps are the mean over
+        `shadow_samples` points. origin: (3,) float64, of the space of light mesh and lamps. Raises DeviceError where
+        the samples do not fit the device, Cancelled when `progress` says so.
         """
         count = len(light_mesh)
-        emitted = np.zeros((max(count, 1), 4), np.float32)
-        emitted[:count, :3] = light_mesh.strength[:, None] * light_mesh.emission
-        radiosity = self._context.buffer(emitted.tobytes())
         if count == 0:
-            return radiosity
-        samples, lights = source_records(light_mesh, origin)
+            return np.zeros((0, 3), np.float32)
+        samples = source_records(light_mesh, origin)
         self._require_room(samples.nbytes, len(samples))
-        windows = _assign_windows(samples, light_mesh, shadows)
-        buffers = {"SOURCE_SAMPLE_BINDING": samples.tobytes() or bytes(16), "SOURCE_LIGHT_BINDING": lights.tobytes()}
-        held = {name: self._context.buffer(data) for name, data in buffers.items()}
+        windows = _assign_windows(samples, light_mesh, shadows, lamps)
+        offsets = light_mesh.samples.offsets.astype(np.int32)
+        sources, ends = self._context.buffer(samples.tobytes() or bytes(16)), self._context.buffer(offsets.tobytes())
+        irradiance = self._context.buffer(bytes(16 * count))
         runs = [
             (lamp, sample, window)
-            for lamp in range(len(shadows.lights))
+            for lamp in lamps
             for sample in range(shadows.samples_of(lamp, shadow_samples))
             for window in (windows if shadows.uses_windows(lamp) else {ANY_WINDOW: None})
         ]
@@ -70,14 +70,14 @@ class PhaseOnePass:
             self._lamp.orphan()
             self._lamp.write(shadow_map.record.tobytes())
             self._lamp.bind_to_storage_buffer(int(CONSTANTS["LAMP_BINDING"]))
-            for name, buffer in held.items():
-                buffer.bind_to_storage_buffer(int(CONSTANTS[name]))
-            radiosity.bind_to_storage_buffer(int(CONSTANTS["RADIOSITY_BINDING"]))
+            sources.bind_to_storage_buffer(int(CONSTANTS["SOURCE_SAMPLE_BINDING"]))
+            ends.bind_to_storage_buffer(int(CONSTANTS["SOURCE_LIGHT_BINDING"]))
+            irradiance.bind_to_storage_buffer(int(CONSTANTS["RESULT_BINDING"]))
             shadow_map.bind()
             set_uniforms(self._shader, {"share": 1.0 / sample_count, "light_count": count, "window": window})
             self._shader.run(-(-count // GROUP_SIZE))
             self._context.memory_barrier()
-        return radiosity
+        return read_radiosity(irradiance, count)
 
     def _require_room(self, size: int, count: int) -> None:
         limit = int(self._context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
@@ -86,24 +86,21 @@ class PhaseOnePass:
             raise DeviceError(f"{count:,} source samples; the device holds {most:,}; bake fewer lights or samples")
 
 
-def source_records(light_mesh: VirtualLightMesh, origin: Float64) -> tuple[np.ndarray, np.ndarray]:
-    """Records of SOURCE_SAMPLE and SOURCE_LIGHT. origin: (3,) float64, world space."""
+def source_records(light_mesh: VirtualLightMesh, origin: Float64) -> np.ndarray:
+    """Records of SOURCE_SAMPLE. origin: (3,) float64, of the light mesh's space."""
     samples = light_mesh.samples
     points = SOURCE_SAMPLE.zeros(len(samples.positions))
     points["position"] = samples.positions - origin
     points["normal"] = samples.normals
     points["weight"] = samples.weights
-    lights = SOURCE_LIGHT.zeros(len(light_mesh))
-    lights["reflectance"] = light_mesh.strength[:, None] * light_mesh.colour
-    lights["first_sample"], lights["end_sample"] = samples.offsets[:-1], samples.offsets[1:]
-    return points, lights
+    return points
 
 
 def _assign_windows(
-    samples: np.ndarray, light_mesh: VirtualLightMesh, shadows: LampShadows
+    samples: np.ndarray, light_mesh: VirtualLightMesh, shadows: LampShadows, lamps: Sequence[int]
 ) -> dict[int, ShadowWindow | None]:
     """The windows of suns' maps that hold source samples; fills the field `window` of their records."""
-    suns = [lamp for lamp in range(len(shadows.lights)) if shadows.uses_windows(lamp)]
+    suns = [lamp for lamp in lamps if shadows.uses_windows(lamp)]
     if not suns:
         return {WHOLE_SCENE: None}
     counts = np.diff(light_mesh.samples.offsets)

@@ -233,11 +233,14 @@ class LampShadows:
         return other
 
     def still(self) -> tuple[LampShadows, LocalSpace]:
-        """The same lamps in the space that no camera moves, with what is drawn there; and that space."""
+        """The same lamps, with a power of 1 but for the world's, in the space that no camera moves; and that space."""
         assert self._still is not None
         casters, space = self._still.casters, self._still.casters.space
         other = copy.copy(self)
-        world = [self._world_light(light) for light in self.lights]
+        world = [
+            replace(_with_unit_power(self._world_light(light)), casts_shadow=light.casts_shadow)
+            for light in self.lights
+        ]
         other.lights = tuple(space.light(light) for light in world)
         other.bounds = casters.low, casters.high
         other._geometry, other._origin, other._space = casters.geometry, np.zeros(3), space
@@ -368,8 +371,11 @@ def rounding(bounds: Bounds) -> float:
     return ROUNDING * 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
 
 
+def _with_unit_power(light: Light) -> Light:
+    return light if light.from_world else replace(light, power=(1.0, 1.0, 1.0))
+
+
 def _shadow_shape(light: Light) -> Light:
     """`light` without what its shadows do not depend on."""
     position = (0.0, 0.0, 0.0) if light.kind == SUN else light.position
-    ones = (1.0, 1.0, 1.0)
-    return replace(light, name="", power=ones, position=position, spot_blend=0.0, soft_falloff=True)
+    return replace(light, name="", power=(1.0, 1.0, 1.0), position=position, spot_blend=0.0, soft_falloff=True)

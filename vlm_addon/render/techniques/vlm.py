@@ -19,11 +19,11 @@ from ...core.settings import OWN, setting
 from ..baked_lights import BakedLights
 from ..light_sums import CellSum, ClusteredSum, FullSum, LightSum
 from ..light_visibility import OctreeVisibility
+from ..lit_lights import scene_lights, scene_radiosity
 from ..octree_settings import OctreeSettings
 from ..passes.accumulate import read_image
 from ..passes.filter import FilterSettings
 from ..passes.light_picks import MOST_PICKS
-from ..passes.phase_one import PhaseOnePass
 from ..technique import FrameInputs, SceneInputs, Technique
 from ..virtual_lights import GpuVirtualLights
 
@@ -135,12 +135,9 @@ class VirtualLightMeshTechnique(Technique):
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         assert scene.light_mesh is not None
-        self._lights = GpuVirtualLights(scene.context, scene.light_mesh, scene.geometry.origin)
-        phase_one = PhaseOnePass(scene.context, scene.shaders)
+        self._lights = scene_lights(scene)
         with scene.timer.measure("phase one"):
-            self._radiosity = phase_one.render(
-                scene.light_mesh, scene.geometry.origin, scene.shadows, scene.settings.shadow_samples, scene.progress
-            )
+            self._radiosity = scene_radiosity(scene)
         before = dict(scene.kept.built)
         self._baked, baked_reasons = self._chosen_bake()
         self._sum = self._chosen_sum(self._baked)
