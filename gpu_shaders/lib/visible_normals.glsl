@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Directions that a GGX lobe reflects into, as dense as the lobe itself but for its shadowing.
+#ifndef LIB_VISIBLE_NORMALS
+#define LIB_VISIBLE_NORMALS
+#include "lib/surface.glsl"
+
+// Half vector of a GGX surface, as dense as to_view sees its facets: a point of the cap of the sphere that the view sees
+// lit (Dupuy and Benyoub 2023). normal, to_view: unit, the view above the surface; alpha: roughness squared; numbers: in
+// [0, 1).
+vec3 visible_normal(vec3 normal, vec3 to_view, float alpha, vec2 numbers) {
+    float cos_view = max(dot(normal, to_view), 0.0);
+    vec3 across = to_view - dot(normal, to_view) * normal;
+    vec3 axis = abs(normal.z) < 0.7 ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0);
+    vec3 tangent = unit_or(across, normalize(cross(normal, axis)));
+    vec3 bitangent = cross(normal, tangent);
+    // Stretched so that the surface is a half sphere.
+    vec3 stretched = normalize(alpha * across + cos_view * normal);
+    float height = dot(stretched, normal);
+    float z = (1.0 - numbers.y) * (1.0 + height) - height;
+    float radius = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    float turn = 6.2831853 * numbers.x;
+    vec3 facet = radius * (cos(turn) * tangent + sin(turn) * bitangent) + z * normal + stretched;
+    float along = max(dot(facet, normal), 0.0);
+    return unit_or(alpha * (facet - dot(facet, normal) * normal) + along * normal, normal);
+}
+
+// Share of what the facets that the view sees reflect that other facets do not hold back: height-correlated Smith over
+// the view's own (Heitz 2014). In [0, 1]; cosines: to the surface's normal.
+float shadowing_share(float cos_light, float cos_view, float alpha) {
+    if (cos_light <= 0.0 || cos_view <= 0.0) {
+        return 0.0;
+    }
+    float alpha_squared = alpha * alpha;
+    float view_root = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_view * cos_view);
+    float light_root = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_light * cos_light);
+    float both = cos_light * view_root + cos_view * light_root;
+    return min(cos_light * (cos_view + view_root) / max(both, 1e-30), 1.0);
+}
+#endif
