@@ -29,7 +29,7 @@ class DepthPyramid:
         self._finest = shaders.compute("passes/depth_pyramid_finest.comp", defines)
         self._coarser = shaders.compute("passes/depth_pyramid.comp", defines)
         # Powers of two, so that every square of every level is whole.
-        size = tuple(1 << (pixels - 1).bit_length() for pixels in (width, height))
+        size = _power_of_two(width), _power_of_two(height)
         self.coarsest = max(size).bit_length() - 1
         self._texture = context.texture(size, 1, dtype="f4")
         self._texture.build_mipmaps(0, self.coarsest)
@@ -60,6 +60,11 @@ class DepthPyramid:
     def _run(self, shader: moderngl.ComputeShader, size: tuple[int, int]) -> None:
         shader.run(-(-size[0] // GROUP_SIDE), -(-size[1] // GROUP_SIDE))
         self._context.memory_barrier()
+
+
+def _power_of_two(pixels: int) -> int:
+    """The least that is not below."""
+    return 1 << (pixels - 1).bit_length()
 
 
 def _pixel_steps(view: View, width: int, height: int) -> tuple[Float64, Float64]:
