@@ -6,7 +6,7 @@ They are made in world space from geometry alone, so neither a lamp nor the came
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -25,7 +25,7 @@ from ..core.light_tree import LightTree, build_light_tree
 from ..core.progress import Progress
 from ..core.range_grid import RangeGrid, RangeSettings, light_shapes
 from ..core.scene import Float32, SceneSnapshot
-from ..core.surface_points import random_surface_points
+from ..core.surface_points import SurfacePoints, random_surface_points
 from ..core.window_factor import window_factor
 from .kept import Kept
 from .passes.light_grid import GpuBlockLists, LightGridPass, half_ball_records, upload
@@ -36,6 +36,18 @@ if TYPE_CHECKING:
     import moderngl
 
 Bools = npt.NDArray[np.bool_]
+
+
+LIT_TREES = "lit trees"
+
+
+@dataclass(frozen=True)
+class SceneTrees:
+    """The trees of a scene's lights. window_factor: by which their windows are enlarged. key: of all they depend on."""
+
+    trees: tuple[LitTree, ...]
+    window_factor: float
+    key: str
 
 
 class LightStructures:
@@ -52,12 +64,26 @@ class LightStructures:
 
     def trees(
         self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float
-    ) -> tuple[list[LitTree], float]:
-        """Trees of the static and of the dynamic lights, without those of no lights, with what they send out; and
-        the factor by which their windows are enlarged.
+    ) -> SceneTrees:
+        """Trees of the static and of the dynamic lights, without those of no lights, with what they send out.
 
         snapshot, light_mesh: in world space. radiosity: (n, 3) W/m².
         """
+        digests = self._kept.digests
+        surfaces = digests.of([[mesh.positions, mesh.triangles, mesh.tag_ids] for mesh in snapshot.meshes])
+        shape = [light_mesh.vertices, light_mesh.triangles, light_mesh.tag_ids, light_mesh.dynamic]
+        key = digests.of(surfaces, shape, radiosity, tolerance)
+
+        def make() -> SceneTrees:
+            probes = self._kept.get("probes", surfaces, lambda: random_surface_points(snapshot.meshes, PROBES))
+            return self._relit(light_mesh, radiosity, tolerance, probes, key)
+
+        return self._kept.get(LIT_TREES, key, make)
+
+    def _relit(
+        self, light_mesh: VirtualLightMesh, radiosity: Float32, tolerance: float, probes: SurfacePoints, key: str
+    ) -> SceneTrees:
+        """The trees, those kept whose shape is as it was. probes: where their errors are judged."""
         values = radiosity.astype(np.float64)
         shapes: dict[str, str] = {}
         trees: dict[str, LightTree] = {}
@@ -66,7 +92,6 @@ class LightStructures:
                 shapes[kind] = lights_hash(light_mesh, chosen, TOLERANCE)
                 build = partial(build_light_tree, light_mesh, chosen)
                 trees[kind] = self._kept.get(f"{kind}_tree", shapes[kind], build)
-        probes = random_surface_points(snapshot.meshes, PROBES)
         state = content_hash([*shapes.values(), radiosity, probes.positions, probes.normals, probes.tag_ids])
         inputs = list(trees.values()), light_mesh, values
         mean = self._kept.get("scale", state, lambda: mean_irradiance(*inputs, probes))
@@ -80,7 +105,7 @@ class LightStructures:
 
             state = content_hash([shapes[kind], radiosity[chosen_lights(light_mesh)[kind]], tolerance, mean, factor])
             result.append(self._kept.get(f"{kind}_clusters", state, relight))
-        return result, factor
+        return SceneTrees(tuple(result), factor, key)
 
     def range_grids(
         self,

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     import moderngl
 
 
+FOREST = "light forest"
+
+
 class LightSum(ABC):
     """One way to sum the lights of a frame. kinds: of the structures that it needs. forest: of the clusters that it
     picks, if any."""
@@ -109,8 +112,13 @@ class ClusteredSum(LightSum):
         assert scene.world_lights is not None
         with scene.timer.measure("relight"):
             values = read_radiosity(radiosity, lights.count)
-            trees, self._window_factor = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
-            self.forest = GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
+            found = scene.structures.trees(scene.world, scene.world_lights, values, tolerance)
+            self._window_factor, trees = found.window_factor, list(found.trees)
+
+            def upload() -> GpuLightForest:
+                return GpuLightForest(scene.context, make_forest(trees, scene.space, lights.count))
+
+            self.forest = scene.kept.several(FOREST, scene.kept.digests.of(found.key, scene.space), upload)
         size = scene.settings.width, scene.settings.height
         seen = None if baked is None else baked.of_trees(trees)
         self._pass = ClusteredPhaseTwoPass(scene.context, scene.shaders, *size, seen)
