@@ -39,6 +39,7 @@ struct Passage {
     float distance;     // m along the ray: where it has met something
     float confidence;   // in [0, 1]: of that
     float gap;          // m: how far behind it is
+    ivec2 pixel;        // whose surface it has met
 };
 
 struct Hit {
@@ -57,6 +58,14 @@ float depth_step(ivec2 pixel) {
     return (pixel_size.x + pixel_size.y * position.w) * (1.0 + min(slope, STEEPEST));
 }
 
+// Where the ray comes to the front of the plane of what a pixel shows, m; below 0 for nowhere.
+float meeting(ivec2 pixel, ReflectionRay ray) {
+    vec3 normal = texelFetch(gbuffer_geometric_normal, pixel, 0).xyz;
+    float towards = -dot(normal, ray.direction);
+    float height = dot(normal, ray.origin - texelFetch(gbuffer_position, pixel, 0).xyz);
+    return towards > 0.0 ? height / towards : -1.0;
+}
+
 // enters, leaves: m along the ray; depth: at which it enters, m. before: the pixel that it comes from. comes_in: whether
 // it was not behind that one.
 Passage pass_pixel(
@@ -70,20 +79,23 @@ Passage pass_pixel(
     bool is_before = height - enters * towards >= -ON_PLANE * size;
     if (is_before) {
         bool meets = towards > 0.0 && height <= leaves * towards;
-        return Passage(meets ? MET : BEFORE, meets ? max(height / towards, 0.0) : 0.0, 1.0, 0.0);
+        return Passage(meets ? MET : BEFORE, meets ? max(height / towards, 0.0) : 0.0, 1.0, 0.0, pixel);
     }
-    if (height - leaves * towards > ON_PLANE * size) {
-        return Passage(OUT, 0.0, 0.0, 0.0);
-    }
-    float gap = max(depth - position.w, 0.0);
-    // It comes in behind: through a crack between pixels of one surface, or from the side into something.
-    float slack = depth_step(pixel);
+    // It comes in behind: past an edge between two pixels of one thing, or from the side into something.
+    float slack = depth_step(pixel), gap = max(depth - position.w, 0.0);
     if (comes_in && abs(texelFetch(gbuffer_position, before, 0).w - position.w) <= slack) {
         gap = max(gap - slack, 0.0);
+        float goes_on = meeting(before, ray);
+        if (goes_on >= 0.0 && goes_on <= leaves) {
+            return Passage(MET, goes_on, 1.0, 0.0, before);
+        }
+    }
+    if (height - leaves * towards > ON_PLANE * size) {
+        return Passage(OUT, 0.0, 0.0, 0.0, pixel);
     }
     bool meets = comes_in && towards > 0.0 && gap <= thickness;
     float confidence = gap > 0.0 ? 1.0 - gap / max(thickness, 1e-20) : 1.0;
-    return Passage(meets && confidence > 0.0 ? MET : BEHIND, enters, confidence, gap);
+    return Passage(meets && confidence > 0.0 ? MET : BEHIND, enters, confidence, gap, pixel);
 }
 
 Hit follow(ReflectionRay ray, ivec2 pixel) {
@@ -110,7 +122,7 @@ Hit follow(ReflectionRay ray, ivec2 pixel) {
             --level;
             continue;
         }
-        Passage passage = Passage(BEFORE, 0.0, 0.0, 0.0);
+        Passage passage = Passage(BEFORE, 0.0, 0.0, 0.0, square);
         if (is_free) {
             level = min(level + 1, coarsest);
         } else {
@@ -130,8 +142,9 @@ Hit follow(ReflectionRay ray, ivec2 pixel) {
         }
         if (passage.kind == MET) {
             vec4 clip = clip_from_local * vec4(ray.origin + passage.distance * ray.direction, 1.0);
-            vec2 place = clamp((clip.xy / clip.w * 0.5 + 0.5) * size, vec2(square), vec2(square) + 1.0);
-            return Hit(place, square, passage.distance, sure * passage.confidence);
+            vec2 corner = vec2(passage.pixel);
+            vec2 place = clamp((clip.xy / clip.w * 0.5 + 0.5) * size, corner, corner + 1.0);
+            return Hit(place, passage.pixel, passage.distance, sure * passage.confidence);
         }
         share = end;
         enters = leaves;
