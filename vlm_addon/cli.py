@@ -21,6 +21,7 @@ EXAMPLES = """examples:
   vlm render hall_vlm.blend --technique vlm --size 960x540 --out hall.png
   vlm check hall_vlm.blend
   vlm techniques
+  vlm effects hall_vlm.blend
 
 vlm is `python -m vlm_addon` or `blender --background --command vlm`.
 """
@@ -65,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_render(commands)
     _add_check(commands)
     _add_techniques(commands)
+    _add_effects(commands)
     return parser
 
 
@@ -103,6 +105,7 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     _scene_options(command)
     command.add_argument("--technique", required=True, metavar="NAME", help="one of `vlm techniques`")
     command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of the technique")
+    _effect_option(command)
     command.add_argument("--size", type=_size, metavar="WxH", help="pixels; as the scene says without")
     command.add_argument("--samples", type=int, default=16, metavar="N", help="jittered pictures averaged (16)")
     shadow_help = "points of each soft lamp, for its penumbra (32)"
@@ -114,6 +117,8 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
         "and dark parts, so that both show their textures"
     )
     command.add_argument("--view", metavar="NAME", help=view_help)
+    all_help = "run all that is enabled anew, also what would change nothing: what the plan of effects saves"
+    command.add_argument("--everything", action="store_true", help=all_help)
     command.add_argument("--out", type=Path, required=True, metavar="IMG", help=".exr (linear Rec.709) or .png")
     command.add_argument("--buffers", type=Path, metavar="DIR", help="every intermediate image as EXR into a folder")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="times, counts and findings")
@@ -132,6 +137,26 @@ def _add_techniques(commands: argparse._SubParsersAction[_Parser]) -> None:
     command = _command(commands, "techniques", "techniques with their settings and defaults", "vlm techniques")
     command.add_argument("--json", type=Path, metavar="REPORT.json", help="the same, machine-readable")
     command.set_defaults(run=_techniques)
+
+
+def _add_effects(commands: argparse._SubParsersAction[_Parser]) -> None:
+    text = "which effects this scene calls for, and why"
+    command = _command(commands, "effects", text, "vlm effects hall_vlm.blend --json plan.json")
+    _scene_options(command)
+    command.add_argument("--technique", metavar="NAME", help="one of `vlm techniques`; the scene's without")
+    command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of the technique")
+    _effect_option(command)
+    command.add_argument("--size", type=_size, metavar="WxH", help="pixels; as the scene says without")
+    command.add_argument("--json", type=Path, metavar="REPORT.json", help="the plan")
+    command.set_defaults(run=_effects)
+
+
+def _effect_option(command: argparse.ArgumentParser) -> None:
+    effect_help = (
+        "an effect, auto, on or off, or one of its settings, as in ambient_occlusion=on or "
+        "ambient_occlusion.radius=0.1; `vlm effects` lists them"
+    )
+    command.add_argument("--effect", action="append", default=[], metavar="NAME=VALUE", help=effect_help)
 
 
 def _command(
@@ -166,7 +191,7 @@ def _bake(arguments: argparse.Namespace) -> int:
 
 
 def _render(arguments: argparse.Namespace) -> int:
-    from .blender.commands import render_command
+    from .blender.render_commands import render_command
 
     render_command(arguments)
     return EXIT_DONE
@@ -179,7 +204,14 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _techniques(arguments: argparse.Namespace) -> int:
-    from .blender.commands import techniques_command
+    from .blender.render_commands import techniques_command
 
     techniques_command(arguments)
+    return EXIT_DONE
+
+
+def _effects(arguments: argparse.Namespace) -> int:
+    from .blender.render_commands import effects_command
+
+    effects_command(arguments)
     return EXIT_DONE

@@ -64,7 +64,6 @@ void classify(PointGroup group, uint first, uint end) {
     barrier();
 }
 
-// A tagged light leaves out the surfaces of its own tag (seed 002, 3.4).
 #define ADD_MEMBERS(CLASS, FORM_FACTOR) \
     for (int word = 0; word < WORDS; ++word) { \
         uint bits = members[(CLASS - 1) * WORDS + word]; \
@@ -77,8 +76,7 @@ void classify(PointGroup group, uint first, uint end) {
             vec3 radiosity = radiosities[i].rgb; \
             for (int k = 0; k < PIXELS; ++k) { \
                 float factor = WEIGHT(i, positions[k]) * FORM_FACTOR; \
-                bool is_own = light.tag_id != UNTAGGED && light.tag_id == tag_ids[k]; \
-                meet(k, i, is_own ? vec3(0.0) : factor * radiosity); \
+                meet(k, i, IS_OWN_LIGHT(light.tag_id, k) ? vec3(0.0) : factor * radiosity); \
             } \
         } \
     }

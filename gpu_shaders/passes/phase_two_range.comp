@@ -30,10 +30,9 @@ uniform uint end_entry;
 
 void meet_light(uint i, int k) {
     VirtualLight light = lights[i];
-    bool is_own = light.tag_id != UNTAGGED && light.tag_id == tag_ids[k];
     float factor = triangle_form_factor(
         positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius);
-    meet(k, i, is_own ? vec3(0.0) : factor * radiosities[i].rgb);
+    meet(k, i, IS_OWN_LIGHT(light.tag_id, k) ? vec3(0.0) : factor * radiosities[i].rgb);
 }
 
 // After the `found`th light.

@@ -22,6 +22,13 @@ vec3 normals[PIXELS];
 int tag_ids[PIXELS];
 bool shown[PIXELS];
 
+// Whether a light of a tag leaves out the k-th pixel's surface (seed 002, 3.4).
+#ifdef NO_TAGS
+#define IS_OWN_LIGHT(TAG, K) false
+#else
+#define IS_OWN_LIGHT(TAG, K) ((TAG) != UNTAGGED && (TAG) == tag_ids[K])
+#endif
+
 ivec2 pixel_at(uint tile, int k) {
     ivec2 corner = ivec2(int(tile) % tiles_across, int(tile) / tiles_across) * (GROUP_SIDE * PIXELS_PER_SIDE);
     return corner + ivec2(gl_LocalInvocationID.xy) + GROUP_SIDE * ivec2(k % PIXELS_PER_SIDE, k / PIXELS_PER_SIDE);

@@ -14,7 +14,7 @@ from ..render.technique import technique_by_name
 from .availability import rendering_problem
 from .color_space import convert, rec709_to_working
 from .light_mesh_io import extract
-from .properties import technique_settings
+from .properties import effect_values, technique_settings
 from .render_process import KEPT
 
 ENGINE_ID = "VLM_ENGINE"
@@ -80,6 +80,7 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
             technique_settings=technique_settings(scene, technique),
             samples=scene.vlm.samples,
             world_lights=scene.vlm.world_lights,
+            effects=effect_values(scene),
         )
         frame = KEPT.render(found.snapshot, found.light_mesh, settings, self._progress)
         if self._is_cancelled():  # too late for the renderer to notice

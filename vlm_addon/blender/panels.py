@@ -8,10 +8,14 @@ from typing import Any
 
 import bpy
 
+from ..core.effect_rules import RULES
+from ..core.effects import OFF
+from ..core.settings import describe
+from ..render.frame_effects import SETTINGS as EFFECT_SETTINGS
 from ..render.technique import technique_by_name
 from . import authoring, availability
 from .engine import ENGINE_ID
-from .properties import shown_settings, technique_group
+from .properties import effect_property, shown_settings, technique_group
 
 CATEGORY = "VLM"
 PIXELS_PER_CHARACTER = 7
@@ -90,6 +94,25 @@ class VLM_PT_render(_SidebarPanel, bpy.types.Panel):  # noqa: N801
         _hint(layout, context, availability.rendering_problem())
 
 
+class VLM_PT_effects(_SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """What frames run: each effect where the scene calls for it, unless the artist says otherwise."""
+
+    bl_label = "Effects"
+    bl_parent_id = "VLM_PT_render"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 (Blender's way)
+
+    def draw(self, context: Any) -> None:
+        """A choice for each effect, and the settings of those that are not off."""
+        group = context.scene.vlm.effects
+        for rule in RULES:
+            choice = getattr(group, rule.name)
+            column = self.layout.column(align=True)
+            _labelled(column, group, rule.name)
+            settings_type = EFFECT_SETTINGS.get(rule.name)
+            for info in describe(settings_type) if settings_type is not None and choice != OFF else ():
+                column.prop(group, effect_property(rule.name, info.name))
+
+
 def _technique_settings(layout: Any, scene: Any) -> None:
     technique = technique_by_name(scene.vlm.technique)
     group = technique_group(scene, technique.name)
@@ -118,4 +141,4 @@ def _wrapped(layout: Any, context: Any, sentence: str, icon: str) -> None:
         layout.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
-CLASSES = (VLM_PT_create, VLM_PT_check, VLM_PT_render)
+CLASSES = (VLM_PT_create, VLM_PT_check, VLM_PT_render, VLM_PT_effects)

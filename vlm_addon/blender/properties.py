@@ -9,8 +9,11 @@ from typing import Any, TypeVar
 
 import bpy
 
+from ..core.effect_rules import RULES
+from ..core.effects import AUTO, OFF, ON
 from ..core.settings import SettingInfo, describe, from_mapping
 from ..core.simplify import SimplifySettings
+from ..render.frame_effects import SETTINGS as EFFECT_SETTINGS
 from ..render.frame_types import LIMITS, RenderSettings
 from ..render.technique import Technique, technique_by_name, technique_list
 
@@ -18,6 +21,7 @@ S = TypeVar("S")
 
 SCENE_PROPERTY = "vlm"
 MOST_SAMPLES = 4096
+CHOICE_TEXTS = {AUTO: "Where the scene calls for it", ON: "Always", OFF: "Never"}
 FLOAT32_DIGITS = 6
 """Significant digits of a Blender property: a limit read back from it is still within the limits."""
 
@@ -54,8 +58,23 @@ def shown_settings(group: Any, settings_type: type) -> list[str]:
     ]
 
 
-def _value(owner: Any, info: SettingInfo) -> Any:
-    value = getattr(owner, info.name)
+def effect_values(scene: Any) -> dict[str, Any]:
+    """What `scene` keeps of effects, as RenderSettings.effects has it."""
+    group = getattr(scene, SCENE_PROPERTY).effects
+    values: dict[str, Any] = {rule.name: getattr(group, rule.name) for rule in RULES}
+    for name, settings_type in EFFECT_SETTINGS.items():
+        for info in describe(settings_type):
+            values[f"{name}.{info.name}"] = _value(group, info, effect_property(name, info.name))
+    return values
+
+
+def effect_property(effect: str, setting: str) -> str:
+    """Name of the property of one setting of an effect."""
+    return f"{effect}_{setting}"
+
+
+def _value(owner: Any, info: SettingInfo, name: str | None = None) -> Any:
+    value = getattr(owner, name or info.name)
     return float(f"{value:.{FLOAT32_DIGITS}g}") if info.type is float else value
 
 
@@ -92,8 +111,9 @@ class VLM_PG_finding(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming o
 def register_scene_settings(undo: ExitStack) -> None:
     """Give scenes the property `vlm`; `undo` hears how to take it away again."""
     groups = {technique.name: _settings_group(technique) for technique in technique_list()}
-    scene_group = _scene_group(groups)
-    for cls in (VLM_PG_finding, *filter(None, groups.values()), scene_group):
+    effects = _effects_group()
+    scene_group = _scene_group(groups, effects)
+    for cls in (VLM_PG_finding, effects, *filter(None, groups.values()), scene_group):
         bpy.utils.register_class(cls)
         undo.callback(bpy.utils.unregister_class, cls)
     pointer = bpy.props.PointerProperty(type=scene_group, name="Virtual Light Mesh")
@@ -117,12 +137,27 @@ def _settings_group(technique: type[Technique]) -> type | None:
     return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations}) if annotations else None
 
 
+def _effects_group() -> type:
+    annotations: dict[str, Any] = {}
+    for rule in RULES:
+        annotations[rule.name] = bpy.props.EnumProperty(
+            name=rule.label,
+            description=rule.text,
+            items=[(choice, _title(choice), text) for choice, text in CHOICE_TEXTS.items()],
+            default=rule.default,
+        )
+        settings_type = EFFECT_SETTINGS.get(rule.name)
+        for info in describe(settings_type) if settings_type is not None else ():
+            annotations[effect_property(rule.name, info.name)] = _property(info)
+    return type("VLM_PG_effects", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+
+
 def _tooltip(technique: type[Technique]) -> str:
     # Blender ends tooltips with a full stop of its own.
     return f"{technique.description}. Known bias: {technique.known_bias()}".removesuffix(".")
 
 
-def _scene_group(groups: dict[str, type | None]) -> type:
+def _scene_group(groups: dict[str, type | None], effects: type) -> type:
     defaults = {field.name: field.default for field in dataclasses.fields(RenderSettings)}
     (target,) = (info for info in describe(SimplifySettings) if info.name == "target_triangles")
     annotations = {
@@ -148,6 +183,7 @@ def _scene_group(groups: dict[str, type | None]) -> type:
             max=LIMITS["world_lights"],
         ),
         "target_triangles": _property(target),
+        "effects": bpy.props.PointerProperty(type=effects, name="Effects"),
         "findings": bpy.props.CollectionProperty(type=VLM_PG_finding, name="Findings of the last check"),
     }
     for technique, group in groups.items():

@@ -12,6 +12,7 @@ CALLED_FOR, NEUTRAL, NOT_WANTED, IMPOSSIBLE = "called for", "neutral", "not want
 """NEUTRAL: it would change nothing, which is known without running it. NOT_WANTED: it would change the picture, but
 for the worse: something else does the same already. IMPOSSIBLE: what it needs is not there."""
 
+SINGULAR = {"have": "has"}
 MOST_NAMES = 2
 """In a sentence; the others are counted."""
 
@@ -36,7 +37,10 @@ class Rule:
     judge: Callable[[SceneFacts, Set[str]], Verdict]
 
 
-def _listed(names: Sequence[str]) -> str:
+def _listed(names: Sequence[str], verb: str = "") -> str:
+    """Names with a verb, if one is given, in its number: what is for one has an s at its end."""
+    if verb:
+        return f"{_listed(names)} {verb if len(names) > 1 else SINGULAR.get(verb, verb + 's')}"
     shown = ", ".join(repr(name) for name in names[:MOST_NAMES])
     return f"{shown} and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else shown
 
@@ -67,18 +71,18 @@ def _direct_light(facts: SceneFacts, running: Set[str]) -> Verdict:
     lamps = facts.lamps
     if not lamps.shining and not facts.is_lit_by_world:
         if lamps.beside:
-            return Verdict(NEUTRAL, f"{_listed(lamps.beside)} shine past every surface")
-        dark = f"{_listed(lamps.dark)} have no power" if lamps.dark else f"scene {facts.scene!r} has none"
+            return Verdict(NEUTRAL, f"{_listed(lamps.beside, 'shine')} past every surface")
+        dark = f"{_listed(lamps.dark, 'have')} no power" if lamps.dark else f"scene {facts.scene!r} has none"
         return Verdict(NEUTRAL, f"no lamp shines: {dark}")
     nothing = _shows_nothing(facts)
     if nothing is not None:
         return nothing
     seen = [name for name in lamps.shining if name not in lamps.not_on_screen]
     if seen:
-        return Verdict(CALLED_FOR, f"{_listed(seen)} shine on what the picture shows")
+        return Verdict(CALLED_FOR, f"{_listed(seen, 'shine')} on what the picture shows")
     if facts.is_lit_by_world:
         return Verdict(CALLED_FOR, "the world sends light")
-    return Verdict(NEUTRAL, f"{_listed(lamps.not_on_screen)} light nothing that the picture shows")
+    return Verdict(NEUTRAL, f"{_listed(lamps.not_on_screen, 'light')} nothing that the picture shows")
 
 
 def _shadows(facts: SceneFacts, running: Set[str]) -> Verdict:
@@ -91,13 +95,16 @@ def _shadows(facts: SceneFacts, running: Set[str]) -> Verdict:
 def _glossy(facts: SceneFacts) -> Verdict:
     if not facts.glossy:
         return Verdict(NEUTRAL, "no material has a specular layer")
-    names = _listed(facts.glossy)
+    names = _listed(facts.glossy, "have")
     if facts.screen is None:
-        return Verdict(CALLED_FOR, f"{names} have a specular layer")
+        return Verdict(CALLED_FOR, f"{names} a specular layer")
     if not facts.screen.glossy:
-        return Verdict(NEUTRAL, f"none of {facts.screen.pixels:,} pixels shows {names}, which have a specular layer")
+        return Verdict(
+            NEUTRAL,
+            f"none of {facts.screen.pixels:,} pixels shows a surface with a specular layer ({_listed(facts.glossy)})",
+        )
     share = 100.0 * facts.screen.glossy / facts.screen.pixels
-    return Verdict(CALLED_FOR, f"{names} have a specular layer, on {share:.3g} % of the picture")
+    return Verdict(CALLED_FOR, f"{names} a specular layer, on {share:.3g} % of the picture")
 
 
 def _direct_specular(facts: SceneFacts, running: Set[str]) -> Verdict:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...core.progress import Progress, step
 from ...core.scene import UNTAGGED
 from ..gpu_layout import CONSTANTS
-from ..shader_library import ShaderLibrary, set_uniforms
+from ..shader_library import Defines, ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .baked_pixels import PixelVisibility
 from .gbuffer import GBuffer
@@ -47,11 +47,6 @@ class IrradianceImage:
 _DEFINES = {**PHASE_TWO_DEFINES, "LISTED": False}
 
 
-def seen_defines(visibility: PixelVisibility | None) -> dict[str, int | float | bool | str]:
-    """Of shaders that sum lights as far as `visibility` says."""
-    return {} if visibility is None else visibility.defines
-
-
 class LightSumPass(ABC):
     """What every form of phase two has."""
 
@@ -62,14 +57,23 @@ class LightSumPass(ABC):
         width: int,
         height: int,
         visibility: PixelVisibility | None = None,
+        *,
+        has_tags: bool = True,
     ) -> None:
-        """visibility: what the sum is multiplied by, light by light; None for 1."""
+        """visibility: what the sum is multiplied by, light by light; None for 1. has_tags: whether lights leave out
+        surfaces of their own tag."""
         self._context = context
         self._visibility = visibility
+        self._tag_defines: Defines = {} if has_tags else {"NO_TAGS": True}
         self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
         self._prepare()
+
+    @property
+    def _sum_defines(self) -> Defines:
+        """Of shaders that sum lights as far as visibility and tags say."""
+        return {**self._tag_defines, **({} if self._visibility is None else self._visibility.defines)}
 
     @abstractmethod
     def _prepare(self) -> None:
@@ -80,7 +84,7 @@ class PhaseTwoPass(LightSumPass):
     """The sum over all lights of radiosity times form factor (seed 002, eq. 3.1 and 3.3)."""
 
     def _prepare(self) -> None:
-        self._shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **seen_defines(self._visibility)})
+        self._shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **self._sum_defines})
 
     def render(
         self, gbuffer: GBuffer, lights: GpuVirtualLights, radiosity: moderngl.Buffer, progress: Progress
@@ -107,7 +111,7 @@ class PhaseTwoPass(LightSumPass):
         progress: Progress,
     ) -> None:
         """Fills `picks` from the lights that the last `render` added up, with its arguments."""
-        shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **picks.defines})
+        shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **self._tag_defines, **picks.defines})
         picks.begin(shader, self._irradiance.texture)
         self._walk(shader, picks.per_dispatch(MAX_LIGHTS_PER_DISPATCH), gbuffer, lights, radiosity, progress)
 

@@ -18,7 +18,6 @@ from .phase_two import (
     LightSumPass,
     bind_lights,
     entry_runs,
-    seen_defines,
 )
 from .tile_bounds import TILE_SIDE, Tiles
 from .tile_walk import (
@@ -58,7 +57,7 @@ class ClusteredPhaseTwoPass(LightSumPass):
     def _prepare(self) -> None:
         self._pool = BufferPool(self._context)
         self._walk = TileWalkPass(self._context, self._shaders, self._pool)
-        self._sums = _of_both(self._shaders, seen_defines(self._visibility))
+        self._sums = _of_both(self._shaders, self._sum_defines)
         self.entries = 0
         self.tiles = 0
 
@@ -101,7 +100,7 @@ class ClusteredPhaseTwoPass(LightSumPass):
         progress: Progress,
     ) -> None:
         """As PhaseTwoPass.pick; picks may be clusters, as rows of `forest.nodes`."""
-        both = _of_both(self._shaders, picks.defines)
+        both = _of_both(self._shaders, {**self._tag_defines, **picks.defines})
         tiles = self._tile_bounds.render(gbuffer)
         picks.begin(both[False], self._irradiance.texture)
         for share, lists in self._walk.lists(tiles, tiles.shown(), forest):

@@ -19,7 +19,7 @@ from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
 from .light_grid import GpuBlockLists
 from .light_picks import LightPicks
-from .phase_two import PHASE_TWO_DEFINES, LightSumPass, bind_lights, entry_runs, seen_defines
+from .phase_two import PHASE_TWO_DEFINES, LightSumPass, bind_lights, entry_runs
 from .tile_walk import LIST_BINDING, LIST_OFFSET_BINDING
 
 if TYPE_CHECKING:
@@ -65,9 +65,7 @@ class RangePhaseTwoPass(LightSumPass):
     """The sum over the lights of each pixel's cell; outside, over those whose active hemisphere holds it."""
 
     def _prepare(self) -> None:
-        self._shader = self._shaders.compute(
-            "passes/phase_two_range.comp", {**_DEFINES, **seen_defines(self._visibility)}
-        )
+        self._shader = self._shaders.compute("passes/phase_two_range.comp", {**_DEFINES, **self._sum_defines})
 
     def render(
         self,
@@ -100,7 +98,9 @@ class RangePhaseTwoPass(LightSumPass):
         progress: Progress,
     ) -> None:
         """As PhaseTwoPass.pick."""
-        shader = self._shaders.compute("passes/phase_two_range.comp", {**_DEFINES, **picks.defines})
+        shader = self._shaders.compute(
+            "passes/phase_two_range.comp", {**_DEFINES, **self._tag_defines, **picks.defines}
+        )
         picks.begin(shader, self._irradiance.texture)
         most = picks.per_dispatch(_MOST_PER_RUN)
         self._walk(shader, most, gbuffer, lights, radiosity, grids, space, bounds, progress)
