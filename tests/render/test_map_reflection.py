@@ -13,8 +13,21 @@ from tests.render.closed_rooms import inward_box
 from tests.render.mirror_rays import first_hits, upload
 from tests.render.rooms import camera_at, quad
 from vlm_addon.core.lamps import lamp_irradiance
-from vlm_addon.core.scene import AREA, DIFFUSE, ORTHOGRAPHIC, POINT, SPOT, SUN, Camera, Float32, Float64, Light
-from vlm_addon.core.scene import Material, Mesh, SceneSnapshot
+from vlm_addon.core.scene import (
+    AREA,
+    DIFFUSE,
+    ORTHOGRAPHIC,
+    POINT,
+    SPOT,
+    SUN,
+    Camera,
+    Float32,
+    Float64,
+    Light,
+    Material,
+    Mesh,
+    SceneSnapshot,
+)
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.local_space import make_local_space
