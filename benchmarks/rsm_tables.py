@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frame times of the gather from reflective shadow maps on the city, in the rows of seed 003's tables 7.1 to 7.6.
+"""Frame times of a city in the rows of seed 003's tables 7.1 to 7.6: every combination of its three effects, share of
+the object, kinds and number of lights, resolution, moving lights.
 
 The published figures are those of Haragăs 2023 on a GeForce RTX 2060 SUPER with a model of ancient Rome of 4 million
-triangles, indirect diffuse light by 200 static samples; from table 7.2 on with specular reflections and ambient
-occlusion as well. Ours are of the city in sample_blends and of the passes that the seed's frame has: G-buffer, direct
-light with shadow maps, reflective shadow maps, gather at every pixel. The last columns are the gather alone, of every
-fourth pixel with interpolation, and of the pattern of 10 samples that the seed cites, once it has a history (where
-lamps move it has none, and takes all 200). Without options the city, the picture and the maps are small; --long takes
-the published sizes.
+triangles. IS: indirect specular light, ours from the picture and, where that shows nothing, from the lamps' reflective
+shadow maps. AO: ambient occlusion, ours from the camera and every map together. ID: indirect diffuse light by 200
+static samples of each map, at every pixel. From table 7.2 on all three run. The city is that of sample_blends; all its
+surfaces are glossy here, since the seed's reflect everywhere.
+
+"ms" is the clock's time for a whole frame, from the scene's arrays to the picture's, without any display. Occlusion
+darkens indirect light alone here, so without ID it has nothing to do: in rows of other effects without ID the gather
+runs, too, and its time is taken off. The columns of IS, AO and ID are those passes alone. The last two are the gather
+of every fourth pixel with interpolation, and of the pattern of 10 samples that the seed cites, once it has a history
+(where lamps move it has none, and takes all 200). Each is the least over the frames, since other programs only ever add
+to it. Without options the city, the picture and the maps are small; --long takes the published sizes.
 """
 
 from __future__ import annotations
@@ -17,6 +23,8 @@ import math
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,14 +33,23 @@ import numpy as np
 from benchmarks.support import ROOT, quiet
 from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
-from vlm_addon.core.scene import SPOT, SUN, Float64, Light, SceneSnapshot
+from vlm_addon.core.scene import PRINCIPLED, SPOT, SUN, Float64, Light, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.passes.shadow_map import SINGLE_TILE_FACTOR
 from vlm_addon.terminal import table
 
 FULL_TRIANGLES = 4_000_000
-PASSES = ("G-buffer", "direct light", "reflective shadow maps", "gather", "accumulate")
+IS, AO, ID = "IS", "AO", "ID"
+ALL = (IS, AO, ID)
+EFFECTS = {IS: ("screen_reflection", "map_reflection"), AO: ("ambient_occlusion",)}
+PASSES = {
+    ID: ("gather",),
+    IS: ("screen reflection", "map reflection", "mix reflections"),
+    AO: ("ambient occlusion",),
+}
+"""Of each effect, as the frame's timings name them."""
+ROUGHNESS = 0.2
 ORDER = (SUN, SPOT, SPOT, SUN, SPOT)
 """Kinds of the lights in the order in which the seed adds them (7.4)."""
 SUN_IRRADIANCE = 3.0
@@ -55,13 +72,14 @@ class Sizes:
     frames: int
 
 
-SHORT = Sizes(40_000, 0.1, 256, 3)
+SHORT = Sizes(40_000, 0.1, 256, 5)
 LONG = Sizes(FULL_TRIANGLES, 1.0, 2048, 5)
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row. published: frames per second and milliseconds. moving: lights that turn between frames."""
+    """One row. published: frames per second and milliseconds. effects: that run. moving: lights that turn between
+    frames."""
 
     label: str
     published: tuple[float, float]
@@ -69,14 +87,26 @@ class Row:
     kinds: tuple[str, ...] = ORDER[:1]
     size: tuple[int, int] = SQUARE
     moving: int = 0
-    technique: str = "rsm_gather"
+    effects: tuple[str, ...] = ALL
 
 
-HEADS = ("", "FPS published", "ms published", "FPS", "ms", "maps drawn", "gather ms", "of every 4th pixel", "10 of 200")
+HEADS = (
+    *("", "FPS published", "ms published", "FPS", "ms", "maps drawn"),
+    *("ID ms", "IS ms", "AO ms", "ID of every 4th pixel", "ID 10 of 200"),
+)
 TABLES = {
-    "7.1 algorithms": (
-        Row("None", (60.41, 16.60), 100.0, technique="direct"),
-        Row("ID", (23.99, 42.28), 100.0),
+    "7.1 algorithms": tuple(
+        Row(" + ".join(effects) or "None", figures, 100.0, effects=effects)
+        for effects, figures in (
+            ((), (60.41, 16.60)),
+            ((IS,), (60.35, 16.71)),
+            ((AO,), (60.40, 16.61)),
+            ((ID,), (23.99, 42.28)),
+            ((IS, AO), (59.93, 16.98)),
+            ((IS, ID), (18.47, 54.89)),
+            ((AO, ID), (22.63, 44.77)),
+            (ALL, (18.08, 56.00)),
+        )
     ),
     "7.2 share of the city": tuple(
         Row(f"{percent:g} %", figures, percent)
@@ -120,14 +150,16 @@ TABLES = {
 
 
 def city(percent: float, triangles: int) -> SceneSnapshot:
-    """That share of a city of so many triangles, without its lights."""
+    """That share of a city of so many triangles, glossy all over, without its lights."""
     share = max(100.0 * triangles / FULL_TRIANGLES * percent / 100.0, 1e-3)
     build = ROOT / "sample_blends" / "build.py"
     with tempfile.TemporaryDirectory() as folder, quiet():
         command = [sys.executable, str(build), "city", "--percent", f"{share:.6f}", "--out", folder]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         open_scene(Path(folder) / "city.blend")
-        return replace(extract().snapshot, lights=())
+        snapshot = extract().snapshot
+    looks = (replace(material, model=PRINCIPLED, roughness=ROUGHNESS) for material in snapshot.materials)
+    return replace(snapshot, lights=(), materials=tuple(looks))
 
 
 def lights(kinds: tuple[str, ...], snapshot: SceneSnapshot) -> tuple[Light, ...]:
@@ -166,51 +198,61 @@ def turned(light: Light, frame: int) -> Light:
 
 @dataclass(frozen=True)
 class Measured:
-    """Milliseconds of the passes of a frame and of the gather in it, and maps that it drew."""
+    """Milliseconds of a whole frame and of the passes in it, by name, and maps that it drew."""
 
     whole_ms: float
-    gather_ms: float
+    pass_ms: Mapping[str, float]
     drawn: int
+
+    def of_effect(self, name: str) -> float:
+        """Milliseconds of its passes."""
+        return sum(self.pass_ms.get(each, 0.0) for each in PASSES[name])
 
 
 def measured(device: Device, scene: SceneSnapshot, row: Row, sizes: Sizes, **values: object) -> Measured:
-    """The least over the frames, since other programs only ever add to it, and the last one's number of maps. values:
-    settings of rsm_gather."""
+    """The least over the frames, and the last one's number of maps. values: settings of rsm_gather."""
     width, height = (max(round(side * sizes.scale), 1) for side in row.size)
-    if row.technique == "rsm_gather":
+    settings = RenderSettings(width, height, "direct", {}, 1, sizes.map_side, 1, effects=_effects(row.effects))
+    if row.effects:
         values = {"resolution": sizes.map_side // SINGLE_TILE_FACTOR, **values}
-    settings = RenderSettings(width, height, row.technique, values, 1, sizes.map_side, 1)
+        settings = replace(settings, technique="rsm_gather", technique_settings=values)
     around = lights(row.kinds, scene)
+    times: list[float] = []
     frames: list[Frame] = []
     for number in range(sizes.frames + 1):
         moved = tuple(turned(light, number) if i < row.moving else light for i, light in enumerate(around))
+        started = time.perf_counter()
         frames.append(device.render(replace(scene, lights=moved), None, settings))
-    times = [dict(frame.timings) for frame in frames[1:]]
-    whole = min(sum(frame.get(name, 0.0) for name in PASSES) for frame in times)
-    gather = min(frame.get("gather", 0.0) for frame in times)
-    return Measured(whole, gather, int(frames[-1].counters.get("reflective_maps_drawn", 0)))
+        times.append(1e3 * (time.perf_counter() - started))
+    passes = [dict(frame.timings) for frame in frames[1:]]
+    least = {name: min(each.get(name, 0.0) for each in passes) for name in passes[0]}
+    return Measured(min(times[1:]), least, int(frames[-1].counters.get("reflective_maps_drawn", 0)))
+
+
+def _effects(chosen: tuple[str, ...]) -> dict[str, str]:
+    """Which of the frame's effects run."""
+    return {name: "on" if effect in chosen else "off" for effect, names in EFFECTS.items() for name in names}
 
 
 def rows_of(name: str, device: Device, sizes: Sizes, cities: dict[float, SceneSnapshot]) -> list[tuple[str, ...]]:
     """The rows of one table as text."""
-    rows = []
-    for row in TABLES[name]:
-        if row.percent not in cities:
-            cities[row.percent] = city(row.percent, sizes.triangles)
-        scene = cities[row.percent]
-        published = f"{row.published[0]:.2f}", f"{row.published[1]:.2f}"
-        if row.technique != "rsm_gather":
-            found = measured(device, scene, row, sizes)
-            rows.append((row.label, *published, f"{1e3 / found.whole_ms:.2f}", f"{found.whole_ms:.1f}", *[""] * 4))
-            continue
-        found, coarse, part = (
-            measured(device, scene, row, sizes, **values)
-            for values in ({"low_resolution": 1}, {}, {"low_resolution": 1, "pattern": "rotating"})
-        )
-        ours = f"{1e3 / found.whole_ms:.2f}", f"{found.whole_ms:.1f}", str(found.drawn)
-        gathers = (f"{each.gather_ms:.1f}" for each in (found, coarse, part))
-        rows.append((row.label, *published, *ours, *gathers))
-    return rows
+    return [_text_of(row, device, sizes, cities) for row in TABLES[name]]
+
+
+def _text_of(row: Row, device: Device, sizes: Sizes, cities: dict[float, SceneSnapshot]) -> tuple[str, ...]:
+    if row.percent not in cities:
+        cities[row.percent] = city(row.percent, sizes.triangles)
+    scene = cities[row.percent]
+    found = measured(device, scene, row, sizes, low_resolution=1)
+    whole = found.whole_ms - (0.0 if ID in row.effects else found.of_effect(ID))
+    published = f"{row.published[0]:.2f}", f"{row.published[1]:.2f}"
+    parts = [f"{found.of_effect(effect):.1f}" if effect in row.effects else "" for effect in (ID, IS, AO)]
+    gathers = ["", ""]
+    if ID in row.effects:
+        alone = replace(row, effects=(ID,))
+        rivals = ({}, {"low_resolution": 1, "pattern": "rotating"})
+        gathers = [f"{measured(device, scene, alone, sizes, **each).of_effect(ID):.1f}" for each in rivals]
+    return row.label, *published, f"{1e3 / whole:.2f}", f"{whole:.1f}", str(found.drawn), *parts, *gathers
 
 
 def main() -> None:
@@ -220,11 +262,15 @@ def main() -> None:
     parser.add_argument("--triangles", type=int, help="of the whole city")
     parser.add_argument("--scale", type=float, help="of the pictures' sides")
     parser.add_argument("--maps", type=int, help="texels along a map")
+    parser.add_argument("--frames", type=int, help="that are measured, after one")
     parser.add_argument("tables", nargs="*", metavar="7.N", help="which tables (default: all)")
     chosen = parser.parse_args()
     base = LONG if chosen.long else SHORT
     sizes = Sizes(
-        chosen.triangles or base.triangles, chosen.scale or base.scale, chosen.maps or base.map_side, base.frames
+        chosen.triangles or base.triangles,
+        chosen.scale or base.scale,
+        chosen.maps or base.map_side,
+        chosen.frames or base.frames,
     )
     cities: dict[float, SceneSnapshot] = {}
     with Device() as device:
