@@ -27,7 +27,7 @@ ROOT_FILES = ("__init__.py", "blender_manifest.toml", "LICENSE", "README.md")
 SOURCE_SUFFIXES = {
     "operators": {".py"},
     "vlm_addon": {".py"},
-    "gpu_shaders": {".glsl", ".vert", ".frag", ".geom", ".comp"},
+    "gpu_shaders": {".glsl", ".vert", ".frag", ".geom", ".comp", ".npy"},
 }
 WHEEL_MACHINES = {"linux-x64": "_x86_64", "windows-x64": "win_amd64", "macos-arm64": "_arm64"}
 
