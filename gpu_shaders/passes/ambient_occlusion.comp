@@ -2,7 +2,8 @@
 // What one view of the scene tells of the surroundings of every pixel's surface (seed 003, 4.2.3 and 4.3.2). The kernel is
 // points along directions as dense as the cosine; a direction is closed where one of its points lies behind what the view
 // shows there, by no more than what shows may be thick: the range check. TELLS_POINTS writes what is known of each point,
-// for passes/ambient_occlusion_join.comp; else the share of open directions is added, by the weight of the view.
+// for passes/ambient_occlusion_join.comp; else the open directions and all are counted, by the weight of the view where
+// it WEIGHS.
 //
 // What shows in a texel is taken for a piece of its triangle's plane. So a plane does not hide its own neighbourhood,
 // however it is seen and however coarse the texels are, and no bias has to make up for that.
@@ -16,6 +17,8 @@ layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
 
 // In front of a plane, or behind it by less than this share of the way from the receiver: rounding.
 #define LEAST_BEHIND 1e-3
+// Of the radius: by so much a receiver is lifted to ask whether a view takes it to be inside something.
+#define LIFT 0.01
 // A view sees a receiver that is within so many texels of what it shows there, and of its plane.
 #define SEEN_WITHIN 2.0
 #define SEEN_ON_PLANE 0.5
@@ -29,7 +32,7 @@ layout(binding = VIEW_NORMAL_UNIT) uniform sampler2D view_normal;       // geome
 #if TELLS_POINTS
 layout(rgba32ui, binding = 0) uniform uimage2D told_points;
 #else
-layout(rg32f, binding = 0) uniform image2D sums;    // openness times weight, and weight
+layout(rg32f, binding = 0) uniform image2D sums;    // open directions, and all; by weight
 #endif
 
 uniform float scale;        // with the offset takes a pixel's place into the space of the view
@@ -104,12 +107,11 @@ bool is_seen(vec3 p, vec3 normal, float cosine) {
         && length(way) * cosine <= SEEN_WITHIN * width;
 }
 
-// What the view tells of a point, and how far from p it shows something there, m, `radius` at most. way: from p to the
-// point. reach: how far behind what shows the point is in it.
-int look(vec3 p, vec3 way, float reach, out float distance_to_p) {
+// What the view tells of the point x, and how far from p it shows something there, m, `radius` at most. before: where
+// the way to x comes from.
+uint look(vec3 p, vec3 x, vec3 before, out float distance_to_p) {
     distance_to_p = radius;
     ivec2 texel;
-    vec3 x = p + way;
     if (!find_texel(x, texel)) {
         return POINT_UNKNOWN;
     }
@@ -122,19 +124,23 @@ int look(vec3 p, vec3 way, float reach, out float distance_to_p) {
 #endif
     }
     vec4 shown = texelFetch(view_position, texel, 0);
-    vec3 behind = shown.xyz - x;
     distance_to_p = min(distance(shown.xyz, p), radius);
-    if (dot(behind, normal) <= LEAST_BEHIND * length(way)) {
+    float least = LEAST_BEHIND * distance(x, p);
+    if (dot(shown.xyz - x, normal) <= least) {
         return POINT_FREE;
     }
-    return length(behind) <= reach + texel_width(shown.w) ? POINT_CLOSED : POINT_UNKNOWN;
+    float behind = distance(shown.xyz, x) - texel_width(shown.w), way = distance(before, x);
+    if (behind <= way && dot(shown.xyz - before, normal) <= least) {
+        return POINT_CLOSED;
+    }
+    return behind <= thickness + way ? POINT_ASSUMED : POINT_UNKNOWN;
 }
 
-// A direction of the kernel of a pixel, and in [0, 1) where between the steps its points lie.
+// A direction of the kernel of a pixel, and in (0, 1] how far the first of its points is from the surface.
 vec4 kernel_direction(ivec2 pixel, int index, vec3 normal) {
     vec2 random = spread_pattern(uvec2(pixel), uint(index), sample_index);
     vec3 direction = cosine_direction(normal, vec2((float(index) + random.x) / float(directions), random.y));
-    return vec4(direction, spread_random(uvec2(pixel), uint(index), sample_index));
+    return vec4(direction, 1.0 - spread_random(uvec2(pixel), uint(index), sample_index));
 }
 
 void main() {
@@ -150,11 +156,18 @@ void main() {
 #else
     uvec4 told = uvec4(0u);
 #endif
-#if !TELLS_POINTS
     vec3 to_eye = is_parallel ? eye : eye - p;
     to_eye *= inversesqrt(max(dot(to_eye, to_eye), 1e-30));
+    bool trusts_thickness = true;
 #if VIEW_IS_MAP
-    if (!is_seen(p, geometric_normal, dot(geometric_normal, to_eye))) {
+    bool sees_receiver = is_seen(p, geometric_normal, dot(geometric_normal, to_eye));
+#if TELLS_POINTS
+    // Over its surface nothing is: a view that takes the receiver to be inside of something takes that for too thick.
+    float unused;
+    vec3 lifted = p + LIFT * radius * geometric_normal;
+    trusts_thickness = sees_receiver || !is_in_the_way(look(p, lifted, lifted, unused));
+#else
+    if (!sees_receiver) {
         return;
     }
 #endif
@@ -166,18 +179,20 @@ void main() {
         if (!is_open) {
             tell(told, (i - first_direction) * steps, POINT_CLOSED);
         }
-        float before = 0.0;
+        vec3 before = p;
         for (int j = 0; j < steps && is_open; ++j) {
-            float part = (float(j) + direction.w) / float(steps);
-            float way = radius * part * part;
+            // The last point is at the radius, so that nothing within it lies beyond all points.
+            float part = (float(j) + direction.w) / (float(steps - 1) + direction.w);
+            vec3 x = p + radius * part * part * direction.xyz;
             float distance_to_p;
-            int found = look(p, way * direction.xyz, thickness + way - before, distance_to_p);
+            uint found = look(p, x, before, distance_to_p);
+            found = found == POINT_ASSUMED && !trusts_thickness ? POINT_UNKNOWN : found;
             nearness += 1.0 - distance_to_p / radius;
             looked += 1.0;
-            before = way;
+            before = x;
             tell(told, (i - first_direction) * steps + j, found);
 #if !TELLS_POINTS
-            is_open = found != POINT_CLOSED;
+            is_open = !is_in_the_way(found);
 #endif
         }
         open += is_open ? 1.0 : 0.0;
@@ -185,12 +200,16 @@ void main() {
 #if TELLS_POINTS
     imageStore(told_points, pixel, told);
 #else
+    float count = float(end_direction - first_direction);
+#if WEIGHS
     float weight = mix(max(dot(normal, to_eye), 0.0), nearness / max(looked, 1.0), distance_share);
     // As a whole number: drivers may take any comparison with NaN for true.
     bool is_usable = (floatBitsToUint(weight) & 0x7fffffffu) <= floatBitsToUint(1.0);
     weight = is_usable ? max(weight, LEAST_WEIGHT) : LEAST_WEIGHT;
-    float share = open / float(end_direction - first_direction);
-    vec2 sum = imageLoad(sums, pixel).xy + vec2(share * weight, weight);
+#else
+    const float weight = 1.0;
+#endif
+    vec2 sum = imageLoad(sums, pixel).xy + weight * vec2(open, count);
     imageStore(sums, pixel, vec4(sum, 0.0, 0.0));
 #endif
 }

@@ -5,7 +5,7 @@
 
 layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
 
-layout(binding = SUMS_UNIT) uniform sampler2D sums; // openness times weight, and weight
+layout(binding = SUMS_UNIT) uniform sampler2D sums; // open directions, and all; by weight
 layout(r32f, binding = 0) writeonly uniform image2D result; // 1 open, 0 closed
 
 uniform int reach;              // pixels to each side

@@ -20,7 +20,7 @@ void main() {
     for (int i = 0; i < directions; ++i) {
         bool is_open = true;
         for (int j = 0; j < steps; ++j) {
-            is_open = is_open && !is_in_the_way(told, i * steps + j);
+            is_open = is_open && !is_in_the_way(told_of(told, i * steps + j));
         }
         open += is_open ? 1.0 : 0.0;
     }

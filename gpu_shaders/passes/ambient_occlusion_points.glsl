@@ -1,20 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What views have told of the points of a kernel: two bits each.
+// What views have told of the points of a kernel: two bits each, up to POINTS_IN_RUN points.
 #ifndef PASSES_AMBIENT_OCCLUSION_POINTS
 #define PASSES_AMBIENT_OCCLUSION_POINTS
 
-#define POINT_UNKNOWN 0
-#define POINT_FREE 1
-#define POINT_CLOSED 2
+// Each overrules those before it.
+#define POINT_UNKNOWN 0u    // not in the view, or far behind what it shows
+#define POINT_ASSUMED 1u    // in the way if what the view shows is thick
+#define POINT_FREE 2u       // before what the view shows
+#define POINT_CLOSED 3u     // the way to it goes through what the view shows
 
-// Adds to what is told of up to POINTS_IN_RUN points: xy: a bit for each that some view says is free; zw: is closed.
-void tell(inout uvec4 told, int point, int found) {
-    told[point >> 5] |= uint(found == POINT_FREE) << (point & 31);
-    told[2 + (point >> 5)] |= uint(found == POINT_CLOSED) << (point & 31);
+#define POINTS_IN_WORD 16
+
+// Adds what a view has found of a point.
+void tell(inout uvec4 told, int point, uint found) {
+    int word = point / POINTS_IN_WORD, first_bit = 2 * (point % POINTS_IN_WORD);
+    uint known = bitfieldExtract(told[word], first_bit, 2);
+    told[word] = bitfieldInsert(told[word], max(known, found), first_bit, 2);
 }
 
-// Whether a point is in the way: a view says so, and none sees it before what it shows.
-bool is_in_the_way(uvec4 told, int point) {
-    return ((told[2 + (point >> 5)] & ~told[point >> 5]) >> (point & 31) & 1u) != 0u;
+bool is_in_the_way(uint found) {
+    return found == POINT_ASSUMED || found == POINT_CLOSED;
+}
+
+// What all views together have found of a point.
+uint told_of(uvec4 told, int point) {
+    return bitfieldExtract(told[point / POINTS_IN_WORD], 2 * (point % POINTS_IN_WORD), 2);
 }
 #endif

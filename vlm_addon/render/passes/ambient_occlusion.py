@@ -134,14 +134,16 @@ class AmbientOcclusionPass:
             rest = iter(maps)
             first = next(rest, None)
             joins = first is not None and self._settings.combine == JOINED
+            variant = {"TELLS_POINTS": joins, "WEIGHS": first is not None and not joins}
             camera = _camera(view, gbuffer) | {"sample_index": sample_index}
-            self._look(gbuffer, (gbuffer.position, gbuffer.geometric_normal), camera, False, joins)
+            self._look(gbuffer, (gbuffer.position, gbuffer.geometric_normal), camera, variant | {"VIEW_IS_MAP": False})
             for found in () if first is None else chain([first], rest):
                 assert space is not None
                 self._lamp.orphan()
                 self._lamp.write(found.record.tobytes())
                 uniforms = _map(found, space) | {"sample_index": sample_index}
-                self._look(gbuffer, (found.position, found.geometric_normal), uniforms, True, joins)
+                shown = found.position, found.geometric_normal
+                self._look(gbuffer, shown, uniforms, variant | {"VIEW_IS_MAP": True})
             if joins:
                 self._join(gbuffer)
         return self._mean(gbuffer)
@@ -156,11 +158,10 @@ class AmbientOcclusionPass:
         gbuffer: GBuffer,
         shown: tuple[moderngl.Texture, moderngl.Texture],
         uniforms: dict[str, Any],
-        is_map: bool,
-        joins: bool,
+        variant: dict[str, bool],
     ) -> None:
         """Adds what one view tells. shown: position and normal of what shows in it."""
-        shader = self._shader("", VIEW_IS_MAP=is_map, TELLS_POINTS=joins)
+        shader = self._shader("", **variant)
         # Drawing a map binds textures and buffers of its own.
         gbuffer.bind()
         for unit, texture in zip((VIEW_POSITION_UNIT, VIEW_NORMAL_UNIT), shown, strict=True):
@@ -176,7 +177,7 @@ class AmbientOcclusionPass:
         }
         set_uniforms(shader, uniforms | kernel)
         for run, (first, end) in enumerate(self._runs()):
-            (self._told_of(run) if joins else self._sums).bind_to_image(0)
+            (self._told_of(run) if variant["TELLS_POINTS"] else self._sums).bind_to_image(0)
             set_uniforms(shader, {"first_direction": first, "end_direction": end})
             shader.run(*self._groups)
             self._context.memory_barrier()
