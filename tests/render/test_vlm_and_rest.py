@@ -13,7 +13,8 @@ from tests.render.rooms import box_room, camera_at, lights_from_triangles, quad,
 from vlm_addon.core.bounce_parts import DYNAMIC, TAGGED, Choice, without_bounce
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import VirtualLightMesh
-from vlm_addon.core.scene import Float32, Mesh, SceneSnapshot
+from vlm_addon.core.scene import PRINCIPLED, Float32, Mesh, SceneSnapshot
+from vlm_addon.core.scene_facts import OWN_SPECULAR, SPECULAR_BY_EFFECTS
 from vlm_addon.core.settings import describe
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
@@ -240,3 +241,45 @@ def test_a_tag_that_is_none_is_refused(device: Device) -> None:
     scene = room_with_flag()
     with pytest.raises(InvalidInput, match="'x' is no tag id"):
         render(device, scene, lights_of(scene), chosen=TAGGED, tags="1, x")
+
+
+def test_the_whole_light_mesh_shows_in_glossy_surfaces(device: Device) -> None:
+    """As with the light mesh alone: what is reflected to the eye is no bounce that could be counted twice."""
+    scene = room_with_flag()
+    scene = replace(scene, materials=tuple(replace(look, model=PRINCIPLED, roughness=0.4) for look in scene.materials))
+    lights = lights_of(scene)
+    effects = {"light_mesh_reflection": "on", "screen_reflection": "off", "map_reflection": "off"}
+    settings = RenderSettings(24, 18, samples=2, shadow_resolution=128, shadow_samples=1, buffers=True, effects=effects)
+    of_mesh = device.render(scene, lights, replace(settings, technique="vlm")).images["specular"]
+    both = replace(settings, technique=NAME, technique_settings={"rest": "rsm_gather"})
+    assert of_mesh.max() > 0.0
+    np.testing.assert_array_equal(device.render(scene, lights, both).images["specular"], of_mesh)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "knows", "asks", "specular"),
+    [
+        ({"rest": "rsm_gather"}, False, False, SPECULAR_BY_EFFECTS),
+        ({"rest": "many_light"}, True, False, SPECULAR_BY_EFFECTS),
+        ({"rest": "rsm_gather", "visibility": "octree"}, True, True, SPECULAR_BY_EFFECTS),
+        ({"rest": "vlm", "vlm_visibility": "baked"}, True, True, SPECULAR_BY_EFFECTS),
+        ({"rest": "lightwave"}, True, False, OWN_SPECULAR),
+        ({"rest": "direct"}, False, False, SPECULAR_BY_EFFECTS),
+    ],
+)
+def test_facts_for_the_plan_are_those_of_both_parts(
+    chosen: dict[str, str], knows: bool, asks: bool, specular: str
+) -> None:
+    facts = VlmAndRest.facts(VlmAndRest.settings(**chosen))
+    assert (facts.name, facts.has_indirect, facts.has_reflecting_lights) == (NAME, True, True)
+    assert (facts.knows_visibility, facts.asks_visibility, facts.specular) == (knows, asks, specular)
+
+
+@pytest.mark.parametrize("chosen", [{"visibility": "octree"}, {"vlm_visibility": "octree", "rest": "vlm"}])
+def test_a_frame_that_leaves_nothing_out_and_keeps_nothing_is_the_same(device: Device, chosen: dict[str, str]) -> None:
+    scene = room_with_flag()
+    lights = lights_of(scene)
+    settings = RenderSettings(24, 18, NAME, {"rest": "rsm_gather", **chosen}, 2, 128, 1)
+    planned, whole = (device.render(scene, lights, replace(settings, economical=each)) for each in (True, False))
+    for name, image in planned.images.items():
+        np.testing.assert_array_equal(image, whole.images[name], err_msg=name)
