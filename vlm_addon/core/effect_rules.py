@@ -26,15 +26,23 @@ class Verdict:
 
 
 @dataclass(frozen=True)
+class Before:
+    """Names of the effects before one. running: those that run. enabled: those that do or would change nothing."""
+
+    running: Set[str] = frozenset()
+    enabled: Set[str] = frozenset()
+
+
+@dataclass(frozen=True)
 class Rule:
     """One effect. default: "auto" (where it is called for) or "off". text: what it does and costs, for tooltips.
-    judge: the verdict, of the facts and the names of the effects before it that run."""
+    judge: the verdict, of the facts and the effects before it."""
 
     name: str
     label: str
     default: str
     text: str
-    judge: Callable[[SceneFacts, Set[str]], Verdict]
+    judge: Callable[[SceneFacts, Before], Verdict]
 
 
 def _listed(names: Sequence[str], verb: str = "") -> str:
@@ -61,13 +69,13 @@ def _is_dark(facts: SceneFacts) -> Verdict | None:
     )
 
 
-def _world_lights(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _world_lights(facts: SceneFacts, before: Before) -> Verdict:
     if not facts.is_lit_by_world:
         return Verdict(NEUTRAL, "the world is black")
     return _shows_nothing(facts) or Verdict(CALLED_FOR, "the world sends light")
 
 
-def _direct_light(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _direct_light(facts: SceneFacts, before: Before) -> Verdict:
     lamps = facts.lamps
     if not lamps.shining and not facts.is_lit_by_world:
         if lamps.beside:
@@ -85,7 +93,7 @@ def _direct_light(facts: SceneFacts, running: Set[str]) -> Verdict:
     return Verdict(NEUTRAL, f"{_listed(lamps.not_on_screen, 'light')} nothing that the picture shows")
 
 
-def _shadows(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _shadows(facts: SceneFacts, before: Before) -> Verdict:
     dark = _is_dark(facts)
     if dark is not None:
         return dark
@@ -107,13 +115,13 @@ def _glossy(facts: SceneFacts) -> Verdict:
     return Verdict(CALLED_FOR, f"{names} a specular layer, on {share:.3g} % of the picture")
 
 
-def _direct_specular(facts: SceneFacts, running: Set[str]) -> Verdict:
-    if "direct_light" not in running:
+def _direct_specular(facts: SceneFacts, before: Before) -> Verdict:
+    if "direct_light" not in before.running:
         return Verdict(NEUTRAL, "there is no direct light")
     return _glossy(facts)
 
 
-def _indirect_light(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _indirect_light(facts: SceneFacts, before: Before) -> Verdict:
     name = facts.technique.name
     if not facts.technique.has_indirect:
         return Verdict(IMPOSSIBLE, f"technique {name!r} has direct light only")
@@ -137,7 +145,7 @@ def _light_of_light_mesh(facts: SceneFacts) -> Verdict:
     return Verdict(CALLED_FOR, f"{lights.reflecting:,} virtual lights reflect what lamps and world send")
 
 
-def _light_tags(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _light_tags(facts: SceneFacts, before: Before) -> Verdict:
     if not facts.technique.has_reflecting_lights or facts.light_mesh is None:
         return Verdict(NEUTRAL, "there are no virtual lights with tags")
     if not facts.light_mesh.tagged:
@@ -149,22 +157,22 @@ def _light_tags(facts: SceneFacts, running: Set[str]) -> Verdict:
     )
 
 
-def _light_visibility(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _light_visibility(facts: SceneFacts, before: Before) -> Verdict:
     if not facts.technique.asks_visibility:
         return Verdict(IMPOSSIBLE, f"technique {facts.technique.name!r} is not asked for it in its settings")
-    if "indirect_light" not in running:
+    if "indirect_light" not in before.running:
         return Verdict(NEUTRAL, "there is no indirect light")
     return Verdict(CALLED_FOR if facts.occlusion.possible else NEUTRAL, facts.occlusion.reason)
 
 
-def _ambient_occlusion(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _ambient_occlusion(facts: SceneFacts, before: Before) -> Verdict:
     if not facts.technique.has_indirect:
         return Verdict(IMPOSSIBLE, f"technique {facts.technique.name!r} has no indirect light to darken")
     if facts.technique.knows_visibility:
         return Verdict(NOT_WANTED, f"technique {facts.technique.name!r} knows by itself where its light is occluded")
     if not facts.occlusion.possible:
         return Verdict(NOT_WANTED, f"no indirect light is occluded: {facts.occlusion.reason}")
-    if "indirect_light" not in running:
+    if "indirect_light" not in before.running:
         return Verdict(NEUTRAL, "there is no indirect light")
     return Verdict(CALLED_FOR, f"nothing else tells where indirect light is occluded, and {facts.occlusion.reason}")
 
@@ -180,20 +188,20 @@ def _reflections(facts: SceneFacts) -> Verdict | None:
     return None if verdict.kind == CALLED_FOR else verdict
 
 
-def _screen_reflection(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _screen_reflection(facts: SceneFacts, before: Before) -> Verdict:
     return _reflections(facts) or _glossy(facts)
 
 
-def _light_mesh_reflection(facts: SceneFacts, running: Set[str]) -> Verdict:
+def _light_mesh_reflection(facts: SceneFacts, before: Before) -> Verdict:
     if not facts.technique.has_reflecting_lights:
         return Verdict(IMPOSSIBLE, f"technique {facts.technique.name!r} has no polygons that shine")
-    if "indirect_light" not in running:
+    if "indirect_light" not in before.running:
         return _reflections(facts) or Verdict(NEUTRAL, "no virtual light shines")
     return _reflections(facts) or _glossy(facts)
 
 
-def _map_reflection(facts: SceneFacts, running: Set[str]) -> Verdict:
-    if "light_mesh_reflection" in running:
+def _map_reflection(facts: SceneFacts, before: Before) -> Verdict:
+    if "light_mesh_reflection" in before.enabled:
         return Verdict(NOT_WANTED, "the light mesh shows in glossy surfaces what the camera does not see")
     unwanted = _reflections(facts)
     if unwanted is not None:
@@ -209,8 +217,8 @@ def _map_reflection(facts: SceneFacts, running: Set[str]) -> Verdict:
 NOISY = ("screen_reflection", "map_reflection", "ambient_occlusion")
 
 
-def _temporal_accumulation(facts: SceneFacts, running: Set[str]) -> Verdict:
-    noisy = [name for name in NOISY if name in running]
+def _temporal_accumulation(facts: SceneFacts, before: Before) -> Verdict:
+    noisy = [name for name in NOISY if name in before.running]
     if not noisy:
         return Verdict(NEUTRAL, "no effect of the frame is noisy")
     return Verdict(CALLED_FOR, f"{', '.join(noisy).replace('_', ' ')} are noisy in a frame of {facts.samples} pictures")

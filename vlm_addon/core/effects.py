@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .effect_rules import IMPOSSIBLE, NEUTRAL, NOT_WANTED, RULES, Rule, Verdict
+from .effect_rules import IMPOSSIBLE, NEUTRAL, NOT_WANTED, RULES, Before, Rule, Verdict
 from .errors import InvalidInput
 from .scene_facts import SceneFacts
 
@@ -69,12 +69,18 @@ def plan_effects(facts: SceneFacts, choices: Mapping[str, str] | None = None, *,
     choices = {} if choices is None else choices
     for name, choice in choices.items():
         _require_known(name, choice)
-    decisions: dict[str, Decision] = {}
+    decisions: list[Decision] = []
+    running: set[str] = set()
+    enabled: set[str] = set()
     for rule in RULES:
-        running = {name for name, decision in decisions.items() if decision.action == RUN}
-        verdict = rule.judge(facts, running)
-        decisions[rule.name] = _decided(rule, verdict, choices.get(rule.name, rule.default), economical)
-    return EffectPlan(tuple(decisions.values()))
+        verdict = rule.judge(facts, Before(running, enabled))
+        decision = _decided(rule, verdict, choices.get(rule.name, rule.default), economical)
+        decisions.append(decision)
+        if decision.action == RUN:
+            running.add(rule.name)
+        if decision.action == RUN or (verdict.kind == NEUTRAL and choices.get(rule.name) != OFF):
+            enabled.add(rule.name)
+    return EffectPlan(tuple(decisions))
 
 
 def _decided(rule: Rule, verdict: Verdict, choice: str, economical: bool) -> Decision:
