@@ -16,7 +16,9 @@ from vlm_addon.core.reach import in_reach
 from vlm_addon.core.scene import AREA, DIFFUSE, POINT, SPOT, SUN, Light, Material, Mesh, SceneSnapshot, Texture
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
+from vlm_addon.render.kept_shadow_maps import KeptShadowMaps
 from vlm_addon.render.lamp_scenes import LampScenes
+from vlm_addon.render.passes import shadow_map
 
 DOWN = {"spot_angle": 0.8, "spot_blend": 0.2}
 LEFT = Light("left", SPOT, (30.0, 30.0, 30.0), (-3.0, 0.0, 2.0), **DOWN)
@@ -200,7 +202,12 @@ def test_memory_does_not_grow_while_lamps_come_and_go(used: Device) -> None:
         lamps = tuple(Light("l", kinds[random.integers(4)], (5.0,) * 3, tuple(place)) for place in places)
         frame = rendered(used, hall(lights=lamps), resolution=8)
         if index % 20 == 19:
-            assert textures_alive(used) == without_maps + 4 * frame.counters["reflective_maps"]
+            kept = 4 * frame.counters.get("reflective_maps", 0) + shadow_maps_kept(used)
+            assert textures_alive(used) == without_maps + kept
+
+
+def shadow_maps_kept(device: Device) -> int:
+    return len(device.kept.hold(shadow_map.KIND, KeptShadowMaps))
 
 
 def textures_alive(device: Device) -> int:

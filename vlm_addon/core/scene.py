@@ -99,7 +99,9 @@ class Mesh:
 
     def bounds(self) -> tuple[Float64, Float64]:
         """Lower and upper corner, (3,) float64 each, of its vertices, of which there is at least one."""
-        return self.positions.min(axis=0), self.positions.max(axis=0)
+        # Along columns: a reduction over rows of three takes ten times as long.
+        columns = self.positions.T
+        return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,8 @@ class SceneSnapshot:
 
     def bounds(self) -> tuple[Float64, Float64]:
         """Lower and upper corner, (3,) float64 each, of all visible triangles; the origin for an empty scene."""
-        filled = [mesh.positions for mesh in self.meshes if len(mesh.positions)]
+        filled = [mesh.bounds() for mesh in self.meshes if len(mesh.positions)]
         if not filled:
             return np.zeros(3), np.zeros(3)
-        return np.min([p.min(axis=0) for p in filled], axis=0), np.max([p.max(axis=0) for p in filled], axis=0)
+        low, high = np.array(filled).swapaxes(0, 1)
+        return low.min(axis=0), high.max(axis=0)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from .digests import Digests
 
@@ -19,6 +19,14 @@ class Reuse:
 
     built: int = 0
     reused: int = 0
+
+
+@runtime_checkable
+class FrameKeeper(Protocol):
+    """Something that keeps what the frames ask it for."""
+
+    def end_frame(self) -> None:
+        """Lets go of what the frame that has come to its end did not need."""
 
 
 @dataclass
@@ -42,7 +50,6 @@ class Kept:
         self._held: dict[str, Any] = {}
         self._parts: dict[str, Kept] = {}
         self._events: dict[str, Reuse] = {}
-        self._at_end: dict[str, Callable[[], None]] = {}
         self.built: dict[str, int] = {}
         self.digests = Digests()
         self.frame_index = 0
@@ -52,12 +59,8 @@ class Kept:
         """One frame: `events` begin anew with it. What `several` was not asked for in a frame that came to its end is
         let go of then."""
         self._begin()
-        try:
-            with self.digests.remembered():
-                yield
-        except BaseException:
-            self._forget_ends()
-            raise
+        with self.digests.remembered():
+            yield
         self._end()
 
     def get(self, kind: str, key: str, make: Callable[[], T]) -> T:
@@ -86,15 +89,12 @@ class Kept:
         return thing
 
     def hold(self, name: str, make: Callable[[], T]) -> T:
-        """What `make` made the first time: something that looks after what it keeps itself, and counts it here."""
+        """What `make` made the first time: something that looks after what it keeps itself, and counts it here. Where
+        it is a FrameKeeper it is told of the ends of frames."""
         if name not in self._held:
             self._held[name] = make()
         thing: T = self._held[name]
         return thing
-
-    def at_end(self, name: str, action: Callable[[], None]) -> None:
-        """Has `action` called where this frame comes to its end; the latest one of each name."""
-        self._at_end[name] = action
 
     def part(self, name: str) -> Kept:
         """Things of the same kinds for another use, as by a second technique: neither takes the other's place."""
@@ -130,13 +130,8 @@ class Kept:
     def _end(self) -> None:
         for kept in self._several.values():
             kept.things = {key: kept.things[key] for key in kept.things if key in kept.asked}
-        for action in self._at_end.values():
-            action()
-        self._at_end = {}
+        for held in self._held.values():
+            if isinstance(held, FrameKeeper):
+                held.end_frame()
         for part in self._parts.values():
             part._end()
-
-    def _forget_ends(self) -> None:
-        self._at_end = {}
-        for part in self._parts.values():
-            part._forget_ends()

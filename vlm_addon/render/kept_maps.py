@@ -19,12 +19,21 @@ class KeptMaps:
     def __init__(self) -> None:
         self._maps: dict[str, ReflectiveShadowMap] = {}
         self._spare: dict[tuple[int, int], list[MapTextures]] = {}
+        self._is_asked = False
 
     def keep_only(self, keys: Collection[str]) -> None:
         """Lets go of all other maps; their textures are drawn into again until `drop_spare`."""
+        self._is_asked = True
         for key in [key for key in self._maps if key not in keys]:
             textures = self._maps.pop(key).textures
             self._spare.setdefault(textures.flux.size, []).append(textures)
+
+    def end_frame(self) -> None:
+        """Lets go of everything where the frame needed no maps at all."""
+        if not self._is_asked:
+            self._maps.clear()
+            self._spare.clear()
+        self._is_asked = False
 
     def drop_spare(self) -> None:
         """Lets go of the textures of maps that are no longer kept."""

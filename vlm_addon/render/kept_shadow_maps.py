@@ -6,8 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import moderngl
-
     from .passes.shadow_map import ShadowMap
 
 CACHE_BYTES = 1 << 29
@@ -23,7 +21,6 @@ class KeptShadowMaps:
     def __init__(self) -> None:
         self._maps: dict[str, ShadowMap] = {}
         self._asked: set[str] = set()
-        self._spare: dict[Size, list[moderngl.Texture]] = {}
         self._nbytes = 0
 
     def get(self, key: str) -> ShadowMap | None:
@@ -35,25 +32,19 @@ class KeptShadowMaps:
         """Whether another map of so many texels may be kept."""
         return self._nbytes + map_bytes(size) <= CACHE_BYTES
 
-    def spare(self, size: Size) -> moderngl.Texture | None:
-        """A texture of that size whose map is no longer kept, if there is any."""
-        found = self._spare.get(size)
-        return found.pop() if found else None
-
     def add(self, key: str, found: ShadowMap) -> None:
         """Keeps a map."""
         self._maps[key] = found
         self._nbytes += map_bytes(found.texture.size)
 
-    def drop_unasked(self) -> None:
-        """Lets go of the maps that were not asked for since the last time. Their textures can be drawn into until the
-        next."""
-        self._spare = {}
+    def end_frame(self) -> None:
+        """Lets go of the maps that were not asked for in the frame."""
         for key in [key for key in self._maps if key not in self._asked]:
-            texture = self._maps.pop(key).texture
-            self._nbytes -= map_bytes(texture.size)
-            self._spare.setdefault(texture.size, []).append(texture)
+            self._nbytes -= map_bytes(self._maps.pop(key).texture.size)
         self._asked = set()
+
+    def __len__(self) -> int:
+        return len(self._maps)
 
 
 def map_bytes(size: Size) -> int:

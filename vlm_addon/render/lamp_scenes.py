@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.array_codec import content_hash
 from ..core.reach import Bools, box_corners, in_reach
 from ..core.scene import NO_TEXTURE, Light, Material, SceneSnapshot
+from .digests import Digests
 from .geometry import TEXTURE_FIELDS
 from .local_space import LocalSpace, make_local_space
 
@@ -35,18 +35,20 @@ class LampScene:
 class LampScenes:
     """What each lamp of a scene can light."""
 
-    def __init__(self, snapshot: SceneSnapshot) -> None:
-        """snapshot: in world space, its meshes usable (GpuGeometry)."""
+    def __init__(self, snapshot: SceneSnapshot, digests: Digests | None = None) -> None:
+        """snapshot: in world space, its meshes usable (GpuGeometry). digests: of the frame, if there is one."""
+        digests = digests or Digests()
+        self._digests = digests
         meshes = tuple(mesh for mesh in snapshot.meshes if len(mesh.triangles))
         materials = snapshot.materials or (Material("default"),)
         self._snapshot = replace(snapshot, meshes=meshes, materials=materials, camera=None)
         self._corners = np.array([box_corners(*mesh.bounds()) for mesh in meshes]).reshape(-1, 8, 3)
         self._used = [np.unique(mesh.material_indices, return_inverse=True) for mesh in meshes]
-        textures = [content_hash(replace(texture, name="")) for texture in snapshot.textures]
-        looks = [_look_hash(material, textures) for material in materials]
+        textures = [digests.of(replace(texture, name="")) for texture in snapshot.textures]
+        looks = [_look_hash(digests, material, textures) for material in materials]
         self._mesh_keys = np.array(
             [
-                content_hash([[getattr(mesh, name) for name in _MESH_FIELDS], places, [looks[i] for i in used]])
+                digests.of([getattr(mesh, name) for name in _MESH_FIELDS], places, [looks[i] for i in used])
                 for mesh, (used, places) in zip(meshes, self._used, strict=True)
             ],
             dtype="S64",
@@ -55,8 +57,8 @@ class LampScenes:
     def of(self, light: Light) -> LampScene:
         """What `light`, in world space, can light."""
         chosen = in_reach(light, self._corners)
-        key = content_hash(self._mesh_keys[chosen])
-        return LampScene(light, chosen, key, content_hash([key, replace(light, name="")]))
+        key = self._digests.of(self._mesh_keys[chosen])
+        return LampScene(light, chosen, key, self._digests.of(key, replace(light, name="")))
 
     def local(self, scene: LampScene) -> tuple[SceneSnapshot, LocalSpace]:
         """The part as a snapshot in local units of a space of its own, both the same for the same key but for the lamp;
@@ -80,12 +82,12 @@ class LampScenes:
         return space.scene(part), space
 
 
-def _look_hash(material: Material, textures: list[str]) -> str:
+def _look_hash(digests: Digests, material: Material, textures: list[str]) -> str:
     look: dict[str, Any] = {field.name: getattr(material, field.name) for field in fields(material)}
     del look["name"]
     for name in TEXTURE_FIELDS.values():
         look[name] = textures[look[name]] if look[name] != NO_TEXTURE else ""
-    return content_hash(look)
+    return digests.of(look)
 
 
 def _with_textures(material: Material, places: dict[int, int]) -> Material:

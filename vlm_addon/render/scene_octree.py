@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.array_codec import content_hash
 from ..core.scene import Float32, Float64, Mesh, SceneSnapshot
 from ..core.voxel_fit import MOST_IN_A_VOXEL, fitting_resolution
 from ..core.voxel_frame import VoxelFrame, make_voxel_frame
@@ -99,7 +98,7 @@ def scene_octree(
     Raises InvalidInput for another resolution or bounds that are not finite, DeviceError where it does not fit.
     """
     frame = make_voxel_frame(world.bounds(), resolution)
-    builder = kept.get("octree_builder", "", lambda: _Builder(context, shaders))
+    builder = kept.hold("octree_builder", lambda: _Builder(context, shaders))
     opaque = np.array([material.alpha > 0.0 for material in world.materials])
     built, keys = [], []
     for kind in _KINDS:
@@ -109,7 +108,8 @@ def scene_octree(
         shown = [_opaque(mesh, opaque) for mesh in meshes]
         reflectance = [mesh.reflectance[rows] for mesh, rows in zip(meshes, shown, strict=True)]
         triangles = [mesh.triangles[rows] for mesh, rows in zip(meshes, shown, strict=True)]
-        key = content_hash(({"frame": frame}, [mesh.positions for mesh in meshes], triangles, reflectance))
+        stands = [[mesh.positions, mesh.triangles, mesh.material_indices, mesh.reflectance] for mesh in meshes]
+        key = kept.digests.of(frame, stands, opaque)
 
         def build(
             kind: str = kind,
@@ -139,7 +139,7 @@ def fitted_octree(
 def needed_resolution(kept: Kept, world: SceneSnapshot, resolution: int) -> int:
     """What core.voxel_fit finds from `resolution` on. Raises InvalidInput as that."""
     meshes, bounds = world.meshes, world.bounds()
-    key = content_hash([resolution, bounds, [[mesh.positions, mesh.triangles] for mesh in meshes]])
+    key = kept.digests.of(resolution, bounds, [[mesh.positions, mesh.triangles] for mesh in meshes])
     return kept.get("octree_resolution", key, lambda: fitting_resolution(meshes, bounds, resolution))
 
 

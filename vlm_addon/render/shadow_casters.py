@@ -53,7 +53,7 @@ class ShadowCasters:
                     self.has_alpha = True
             self._keys.append(kept.digests.of(key))
             first += len(mesh.triangles)
-        corners = [box_corners(mesh.positions.min(axis=0), mesh.positions.max(axis=0)) for mesh in meshes]
+        corners = [box_corners(*mesh.bounds()) for mesh in meshes]
         self._corners = np.array(corners).reshape(-1, 8, 3)
         self._geometry: GpuGeometry | None = None
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.array_codec import content_hash
 from ..core.errors import DeviceError
 from ..core.scene import Float32, Float64, Int32, Mesh
+from .digests import Digests
 
 if TYPE_CHECKING:
     import moderngl
@@ -32,9 +32,9 @@ class Corners:
     faces: Int32
 
 
-def corners_key(meshes: Sequence[Mesh]) -> str:
+def corners_key(meshes: Sequence[Mesh], digests: Digests) -> str:
     """A hash of all that `find_corners` reads: not of where vertices are."""
-    return content_hash([[mesh.triangles, mesh.corner_normals, mesh.material_indices] for mesh in meshes])
+    return digests.of([[mesh.triangles, mesh.corner_normals, mesh.material_indices] for mesh in meshes])
 
 
 def find_corners(meshes: Sequence[Mesh]) -> Corners:

@@ -82,7 +82,7 @@ class WaveShadows:
         self._map_pass = WaveMapPass(scene.context, scene.shaders, size)
         self._maps: list[WaveMaps] = []
         if self.map_count:
-            occluders = occluders_key(scene.world)
+            occluders = occluders_key(scene.world, scene.kept.digests)
             with scene.timer.measure("indirect shadow maps"):
                 still = _StillScene(scene, self._map_pass)
                 self._maps = [store.maps(still.draw, places, occluders, size) for places in lights]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.array_codec import content_hash
 from ...core.lamps import LampSample, lamp_samples
 from ...core.scene import AREA, Float32, Float64, Light, SceneSnapshot
 from ..albedo_texture import AlbedoTexture
@@ -36,6 +35,8 @@ MIP_GROUP_SIDE = 8
 CACHE_BYTES = 1 << 29
 """Of maps that are kept; those beyond are drawn for each picture."""
 CHANNELS = 3
+KIND = "reflective maps"
+"""Of what is counted as kept over frames."""
 
 
 @dataclass(frozen=True)
@@ -250,21 +251,21 @@ class LampReflections:
         self._context = context
         self._pass = ReflectiveShadowMapPass(context, shaders, resolution)
         self._area_maps = area_maps
-        self._scenes = LampScenes(snapshot)
+        self._scenes = LampScenes(snapshot, kept.digests)
         self._sources: list[_Source] = []
         for light in snapshot.lights:
             if max(light.power) > 0.0:
                 scene = self._scenes.of(light)
                 count = len(map_points(light, area_maps))
                 for sample in range(count):
-                    key = content_hash([scene.lamp_key, self._pass.face, sample, count])
+                    key = kept.digests.of(scene.lamp_key, self._pass.face, sample, count)
                     self._sources.append(_Source(scene, sample, key))
         self._kept = kept
-        self._maps: KeptMaps = kept.get("reflective_maps", "", KeptMaps)
+        self._maps: KeptMaps = kept.hold(KIND, KeptMaps)
         self._maps.keep_only({source.key for source in self._sources})
         self._shared: dict[tuple[int, int], MapTextures] = {}
         self._part: tuple[str, GpuGeometry, LocalSpace] | None = None
-        self.key = content_hash([source.key for source in self._sources])
+        self.key = kept.digests.of([source.key for source in self._sources])
 
     def __len__(self) -> int:
         return len(self._sources)
@@ -301,6 +302,7 @@ class LampReflections:
         """The map from those that are kept, drawn now if it is not there and fits among them; else None."""
         found = self._maps.get(source.key)
         if found is not None:
+            self._kept.count(KIND, is_new=False)
             return found
         geometry, light, _ = self._scene_of(source.scene)
         size = self._pass.size(geometry, light)
@@ -313,6 +315,7 @@ class LampReflections:
     def _render(self, source: _Source, textures: MapTextures | None) -> ReflectiveShadowMap:
         geometry, light, space = self._scene_of(source.scene)
         found = self._pass.render(geometry, light, source.sample_index, self._area_maps, textures)
+        self._kept.count(KIND, is_new=True)
         return replace(found, space=space)
 
     def _scene_of(self, scene: LampScene) -> tuple[GpuGeometry, Light, LocalSpace]:

@@ -224,7 +224,6 @@ class LampShadows:
         self._maps = KeptShadowMaps()
         if still is not None:
             self._maps = still.kept.hold(KIND, KeptShadowMaps)
-            still.kept.at_end(KIND, self._maps.drop_unasked)
 
     def for_lights(self, lights: Sequence[Light]) -> LampShadows:
         """The same for other lights, of these or SUNs; what both have is drawn once for both."""
@@ -324,7 +323,7 @@ class LampShadows:
     ) -> ShadowMap:
         size = self._pass.size(source.light)
         keep = keep and self._maps.has_room(size)
-        texture = self._maps.spare(size) if keep else self._shared.get(size)
+        texture = None if keep else self._shared.get(size)
         found = self._pass.render(source.geometry(), source.light, *sampled, texture, window, source.bounds)
         if keep:
             self._maps.add(key, found)

@@ -147,8 +147,7 @@ class LightWave(Technique):
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
         context, shaders, size = scene.context, scene.shaders, (scene.settings.width, scene.settings.height)
-        self._store = scene.kept.get("lightwave", "", WaveStore)
-        self._store.begin()
+        self._store = WaveStore(scene.kept)
         glossy = any(material.model != DIFFUSE for material in scene.snapshot.materials) or not scene.snapshot.materials
         self._has_specular = settings.specular and glossy
         self._waves = self._found_waves()
@@ -156,7 +155,6 @@ class LightWave(Technique):
         self._gpu_waves = [upload_wave(context, wave, scene.space, settings.strength) for wave in self._waves]
         shadows = WaveShadowSettings(settings.shadows, settings.maps, settings.steps, settings.map_scale)
         self._shadows = WaveShadows(scene, self._store, self._waves, shadows)
-        self._store.end()
         self._images = {name: IrradianceImage(context, *size) for name in ("light", "specular", "unshadowed")}
         self._wave_images = [IrradianceImage(context, *size) for _ in range(2)]
         defines = {**WAVE_DEFINES, "VISIBILITY_UNIT": VISIBILITY_UNIT, "AT_CORNERS": settings.computed_at == CORNERS}
@@ -179,7 +177,9 @@ class LightWave(Technique):
     def _sum_at_corners(self) -> None:
         scene = self.scene
         meshes = scene.snapshot.meshes
-        corners = scene.kept.get("lightwave_corners", corners_key(meshes), lambda: find_corners(meshes))
+        corners = scene.kept.get(
+            "lightwave_corners", corners_key(meshes, scene.kept.digests), lambda: find_corners(meshes)
+        )
         self._corners = GpuCorners(scene.context, corners, meshes, scene.geometry.origin)
         view = self._centred_view()
         with scene.timer.measure("wave of light"):

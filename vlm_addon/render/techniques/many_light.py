@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.array_codec import content_hash
 from ...core.light_walk import SurfaceMeans, bounce_counts, surface_means
 from ...core.progress import Progress, step
 from ...core.scene import Float32
@@ -235,7 +234,7 @@ class ManyLight(Technique):
     def _surface_means(self) -> SurfaceMeans:
         """Of all surfaces, kept while they stay as they are."""
         meshes = self.scene.world.meshes
-        key = content_hash([[mesh.positions, mesh.triangles, mesh.reflectance] for mesh in meshes])
+        key = self.scene.kept.digests.of([[mesh.positions, mesh.triangles, mesh.reflectance] for mesh in meshes])
         means: SurfaceMeans = self.scene.kept.get("surface_means", key, lambda: surface_means(meshes))
         return means
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.array_codec import content_hash
 from ...core.halton import halton_points
 from ...core.progress import Progress
 from ...core.scene import Float32, Float64
@@ -182,7 +181,7 @@ class SecondOrder(Technique):
             source = IndirectLights(scene.context, scene.shaders, self._maps)
             return PlacedLights(tuple(source.take(count, pictures)), source.brightest)
 
-        return scene.kept.get("indirect_lights", content_hash([self._maps.key, count, pictures]), place)
+        return scene.kept.get("indirect_lights", scene.kept.digests.of(self._maps.key, count, pictures), place)
 
     def _bound_share(self) -> float:
         """Of the light on all surfaces, what the bounded geometry term takes off."""
@@ -195,7 +194,7 @@ class SecondOrder(Technique):
     def _receivers(self) -> SurfacePoints:
         """Points of all surfaces, the same for the same scene."""
         meshes = self.scene.world.meshes
-        key = content_hash([[mesh.positions, mesh.triangles] for mesh in meshes])
+        key = self.scene.kept.digests.of([[mesh.positions, mesh.triangles] for mesh in meshes])
         return self.scene.kept.get("surface_receivers", key, lambda: random_surface_points(meshes, BOUND_RECEIVERS))
 
     def _gathered(self, picked: PickedPixels, negative: PointLights, progress: Progress) -> moderngl.Texture:
