@@ -76,13 +76,20 @@ Passage pass_pixel(
     float size = pixel_size.x + pixel_size.y * position.w;
     float towards = -dot(normal, ray.direction);
     float height = dot(normal, ray.origin - position.xyz);
+    float depth_left = depth - (leaves - enters) * dot(ray.direction, camera_backward);
+    // A plane that is seen edge on goes on within the pixel, but what shows of it need not.
+    float slack = depth_step(pixel);
+    if (max(depth, depth_left) < position.w - slack) {
+        return Passage(BEFORE, 0.0, 0.0, 0.0, pixel);
+    }
+    bool is_deep = min(depth, depth_left) > position.w + slack;
     bool is_before = height - enters * towards >= -ON_PLANE * size;
-    if (is_before) {
+    if (is_before && !is_deep) {
         bool meets = towards > 0.0 && height <= leaves * towards;
         return Passage(meets ? MET : BEFORE, meets ? max(height / towards, 0.0) : 0.0, 1.0, 0.0, pixel);
     }
     // It comes in behind: past an edge between two pixels of one thing, or from the side into something.
-    float slack = depth_step(pixel), gap = max(depth - position.w, 0.0);
+    float gap = max(depth - position.w, 0.0);
     if (comes_in && abs(texelFetch(gbuffer_position, before, 0).w - position.w) <= slack) {
         gap = max(gap - slack, 0.0);
         float goes_on = meeting(before, ray);
@@ -90,12 +97,16 @@ Passage pass_pixel(
             return Passage(MET, goes_on, 1.0, 0.0, before);
         }
     }
-    if (height - leaves * towards > ON_PLANE * size) {
+    if (!is_deep && !comes_in && height - leaves * towards > ON_PLANE * size) {
         return Passage(OUT, 0.0, 0.0, 0.0, pixel);
     }
     bool meets = comes_in && towards > 0.0 && gap <= thickness;
     float confidence = gap > 0.0 ? 1.0 - gap / max(thickness, 1e-20) : 1.0;
-    return Passage(meets && confidence > 0.0 ? MET : BEHIND, enters, confidence, gap, pixel);
+    if (meets && confidence > 0.0) {
+        return Passage(MET, enters, confidence, 0.0, pixel);
+    }
+    bool is_nearer = comes_in && max(depth, depth_left) <= position.w;
+    return Passage(is_nearer ? BEFORE : BEHIND, 0.0, 0.0, gap, pixel);
 }
 
 Hit follow(ReflectionRay ray, ivec2 pixel) {

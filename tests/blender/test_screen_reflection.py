@@ -61,14 +61,7 @@ def positions_by_cycles(folder):
     for material in bpy.data.materials:
         if material.name != MIRROR:
             _glow_by_position(material)
-    scene.render.engine = "CYCLES"
-    scene.cycles.device = "CPU"
-    scene.cycles.samples = 4
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
-    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01
-    scene.cycles.max_bounces = scene.cycles.glossy_bounces = 1
-    scene.cycles.blur_glossy = 0.0
-    scene.render.resolution_percentage = 100
+    _cycles_at_centres(scene, samples=4)
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     scene.render.filepath = str(folder / "positions.exr")
@@ -87,6 +80,45 @@ def _glow_by_position(material):
     links.new(geometry.outputs["Position"], scaled.inputs[0])
     links.new(scaled.outputs[0], glow.inputs["Color"])
     links.new(glow.outputs[0], output.inputs["Surface"])
+
+
+def _cycles_at_centres(scene, samples):
+    """One specular bounce and no other."""
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU"
+    scene.cycles.samples = samples
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01
+    scene.cycles.max_bounces = scene.cycles.glossy_bounces = 1
+    scene.cycles.diffuse_bounces = 0
+    scene.cycles.blur_glossy = scene.cycles.sample_clamp_indirect = 0.0
+    scene.render.resolution_percentage = 100
+
+
+def light_by_cycles(folder):
+    """(h, w, 3) each, at pixels' centres: direct light off diffuse surfaces, and light off them in glossy ones."""
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    _cycles_at_centres(scene, samples=128)
+    for name in ("diffuse_direct", "diffuse_color", "glossy_indirect", "glossy_color"):
+        setattr(layer, f"use_pass_{name}", True)
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type, settings.use_exr_interleave = "MULTI_LAYER_IMAGE", True
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth = "32"
+    scene.render.filepath = str(folder / "light.exr")
+    bpy.ops.render.render(write_still=True)
+    channels = read_exr(folder / "light.exr")
+
+    def product(*names):
+        found = []
+        for long, short in names:
+            known = next(name for name in (long, short) if f"{layer.name}.{name}.R" in channels)
+            found.append(image_of(channels, f"{layer.name}.{known}."))
+        return found[0] * found[1]
+
+    diffuse = product(("Diffuse Direct", "DiffDir"), ("Diffuse Color", "DiffCol"))
+    return diffuse, product(("Glossy Indirect", "GlossInd"), ("Glossy Color", "GlossCol"))
 
 
 def on_screen(camera, places):
@@ -135,3 +167,29 @@ def _shows_mirror(found, pixels, mirror):
     column, row = np.floor(found.hits[pixels][:, :2]).astype(int).T
     material = found.material[np.clip(HEIGHT - 1 - row, 0, HEIGHT - 1), np.clip(column, 0, WIDTH - 1)]
     return (found.confidence[pixels] > 0.0) & (material == mirror)
+
+
+@pytest.mark.parametrize(("metallic", "roughness"), [(1.0, 0.1), (0.0, 0.2)])
+def test_rough_surfaces_reflect_as_much_as_in_cycles(device, mirror_room, make_light, tmp_path, metallic, roughness):
+    """Mean of 64 pictures where next to all rays meet what the picture shows."""
+    color = (0.9, 0.6, 0.3, 1.0) if metallic else (0.0, 0.0, 0.0, 1.0)
+    shader = next(n for n in bpy.data.materials[MIRROR].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    for name, value in {"Base Color": color, "Metallic": metallic, "Roughness": roughness}.items():
+        shader.inputs[name].default_value = value
+    make_light("POINT", 500.0, (0.0, -3.0, 4.0)).data.shadow_soft_size = 0.0
+    bpy.data.objects.remove(bpy.data.objects["Sphere"])
+    bpy.context.view_layer.update()
+    snapshot = extract_scene()
+    mirror = next(i for i, material in enumerate(snapshot.materials) if material.name == MIRROR)
+    lit, expected = light_by_cycles(tmp_path)
+    lit = np.concatenate([lit, np.ones((HEIGHT, WIDTH, 1))], axis=2).astype(np.float32)
+    settings, pictures = ReflectionSettings(edge_fade=0.0), 64
+    mean = np.zeros((HEIGHT, WIDTH, 4))
+    for index in range(pictures):
+        found = reflected(device, snapshot, settings, lit, (WIDTH, HEIGHT), sample_index=index)
+        mean += found.image / pictures
+    sure = (found.material == mirror) & (mean[..., 3] > 0.98)
+    assert sure.sum() > 400
+    ours, theirs = mean[sure][:, :3], expected[sure]
+    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.015)
+    assert np.median(np.abs(ours - theirs).sum(axis=1) / theirs.sum(axis=1)) < 0.02
