@@ -97,10 +97,10 @@ def test_rsm_tables_have_the_published_figures_beside_ours(run: Run) -> None:
         ]
         others = [2 if rsm_tables.ID in each.effects else 0 for each in published]
         assert [len(numbers(row[1:])) for row in rows] == [
-            5 + len(each.effects) + count for each, count in zip(published, others, strict=True)
+            6 + len(each.effects) + count for each, count in zip(published, others, strict=True)
         ]
-        assert all(min(numbers(row[3:])[:2]) > 0.0 for row in rows)
-    assert [row[5] for row in found[-1]] == ["0", "1", "2", "3"], "maps drawn are those of the lamps that move"
+        assert all(min(numbers(row[3:])[:3]) > 0.0 for row in rows)
+    assert [row[6] for row in found[-1]] == ["0", "1", "2", "3"], "maps drawn are those of the lamps that move"
 
 
 def test_world_light_has_a_row_for_each_number_of_lights(run: Run) -> None:
