@@ -9,8 +9,11 @@ import pytest
 from tests.render.closed_rooms import inward_box
 from tests.render.rooms import box_room, quad
 from vlm_addon.core import occluders
-from vlm_addon.core.occluders import find_occlusion
+from vlm_addon.core.lamps import lamp_hull
+from vlm_addon.core.occluders import find_occlusion, occluding_triangles
+from vlm_addon.core.scene import SUN, Light
 
+NOWHERE = np.zeros((0, 3))
 ROOM = inward_box([-1, -1, -1], [1, 1, 1], [0] * 6)
 
 
@@ -77,3 +80,70 @@ def test_what_takes_too_long_counts_as_an_occluder(monkeypatch):
     found = find_occlusion(ROOM)
     assert found.possible
     assert "12 triangles" in found.reason
+
+
+def masks(meshes, sources, directions=NOWHERE):
+    return occluding_triangles(meshes, find_occlusion(meshes, sources, directions), sources, directions)
+
+
+def test_a_sun_counts_as_a_point_without_end():
+    floor = ROOM[4:5]
+    for towards, possible in (((0.3, 0.2, 1.0), False), ((0.3, 0.2, -1.0), False), ((0.0, 0.0, 1.0), False)):
+        assert find_occlusion(floor, None, np.array([towards])).possible == possible
+    # Seen from both sides at once, the floor is between one of the suns and whoever is beyond.
+    assert find_occlusion(floor, None, np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])).possible
+    assert find_occlusion(ROOM, None, np.array([(0.3, 0.2, 1.0)])).possible
+
+
+def test_a_wide_sun_is_held_by_its_hull():
+    sun = Light("sun", SUN, (1.0,) * 3, (0.0,) * 3, angle=0.5, z_axis=(0.0, 0.0, 1.0))
+    hull = lamp_hull(sun)
+    hull /= np.linalg.norm(hull, axis=1, keepdims=True)
+    assert (hull[:, 2] < np.cos(0.25)).all()
+    assert np.sign(hull[:, :2]).prod(axis=1).sum() == 0.0
+
+
+@pytest.mark.parametrize("place", [(0.3, 0.2, 0.5), (0.0, 0.0, 3.0)], ids=["lamp inside", "lamp outside"])
+def test_triangles_that_are_no_occluders_stop_no_ray(place):
+    block = inward_box([-0.6, -0.5, -1.0], [0.1, 0.3, -0.2], [0] * 6, outward=True)
+    meshes, random = [*ROOM, *block], np.random.default_rng(2)
+    found = masks(meshes, np.array([place]))
+    assert any(mask.any() for mask in found)
+    assert not all(mask.all() for mask in found)
+    ends = np.concatenate([points_on(mesh, random, 200) for mesh in meshes])
+    for mesh, mask in zip(meshes, found, strict=True):
+        for corners in mesh.positions[mesh.triangles[~mask]]:
+            assert not crosses(np.array(place), ends, corners).any()
+
+
+def test_walls_around_a_lamp_are_no_occluders_and_things_are():
+    block = inward_box([-0.6, -0.5, -1.0], [0.1, 0.3, -0.2], [0] * 6, outward=True)
+    inside = masks([*ROOM, *block], np.array([(0.3, 0.2, 0.5)]))
+    assert not any(mask.any() for mask in inside[:6])
+    assert sum(mask.all() for mask in inside[6:]) >= 5
+    outside = masks([*ROOM, *block], np.array([(0.3, 0.2, 1.5)]))
+    assert outside[5].all()
+
+
+def test_too_many_to_compare_all_count(monkeypatch):
+    monkeypatch.setattr(occluders, "MOST_PAIRS_FOR_EACH", 10)
+    plate = quad((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
+    assert masks([*ROOM, plate], np.zeros((1, 3))) is None
+
+
+def points_on(mesh, random, count):
+    """(count, 3) random points of its first triangle and its second."""
+    u, v = random.random((2, count, 1))
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    a, b, c = (mesh.positions[mesh.triangles[random.integers(0, len(mesh.triangles), count), k]] for k in range(3))
+    return a + u * (b - a) + v * (c - a)
+
+
+def crosses(start, ends, corners):
+    """Which segments from `start` to (n, 3) `ends` pass through a triangle's inside, both ends off its plane."""
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    before, beyond = (start - corners[0]) @ normal, (ends - corners[0]) @ normal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meeting = start + (before / (before - beyond))[:, None] * (ends - start)
+    sides = [np.cross(corners[(k + 1) % 3] - corners[k], meeting - corners[k]) @ normal > 1e-9 for k in range(3)]
+    return (np.abs(beyond) > 1e-9) & (before * beyond < -1e-12) & np.logical_and.reduce(sides)

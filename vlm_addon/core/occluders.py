@@ -8,10 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .reach import Bools
 from .scene import Float64, Mesh
 
 MOST_PAIRS = 10_000_000
 """Of a triangle and a point that are looked at, some tenths of a second; scenes with more count as having occluders."""
+
+MOST_PAIRS_FOR_EACH = 1_000_000
+"""The same where each triangle is judged, some hundredths of a second: this may be done for every frame."""
 
 _AT_ONCE = 1_000_000
 _SLACK = 1e-6
@@ -40,41 +44,61 @@ def find_occlusion(
     triangle_count = sum(len(mesh.triangles) for mesh in filled)
     if not triangle_count:
         return Occlusion(False, "nothing can occlude anything: there is no surface")
-    points = np.concatenate([mesh.positions[np.unique(mesh.triangles)] for mesh in filled]).astype(np.float64)
-    if source_points is not None:
-        points = np.concatenate([points, source_points])
-    points = np.unique(points, axis=0)
+    points, slack = _all_points(filled, source_points)
     directions = np.zeros((0, 3)) if source_directions is None else source_directions
-    slack = _SLACK * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     left, at_once = MOST_PAIRS, max(_AT_ONCE // len(points), 1)
     for mesh in filled:
         corners = mesh.positions[mesh.triangles].astype(np.float64)
         for first in range(0, len(corners), at_once):
             if left <= 0:
                 return Occlusion(True, f"{triangle_count:,} triangles may occlude each other: too many to compare all")
-            if not _have_all_on_one_side(corners[first : first + at_once], points, directions, slack):
+            if not _have_all_on_one_side(corners[first : first + at_once], points, directions, slack).all():
                 return Occlusion(True, f"{mesh.name!r} has other surfaces on both sides and may stand between them")
             left -= at_once * len(points)
     text = f"each of the {triangle_count:,} triangles has the whole scene on one side"
     return Occlusion(False, f"nothing can occlude anything: {text}")
 
 
-def _have_all_on_one_side(corners: Float64, points: Float64, directions: Float64, slack: float) -> bool:
-    """Whether each of (t, 3, 3) triangles has all of (p, 3) points, and all that lies far in (d, 3) directions, on one
-    side of its plane, the points within `slack` of it.
+def occluding_triangles(
+    meshes: Sequence[Mesh], occlusion: Occlusion, source_points: Float64, source_directions: Float64
+) -> tuple[Bools, ...] | None:
+    """Which triangles of each mesh may stand between a source and a surface point, as find_occlusion has it; None for
+    all, where there are too many to compare.
+
+    occlusion: what find_occlusion says of the same arguments. The others only end segments: a map of what a lamp sees
+    need not hold them, and is exact next to walls without them.
+    """
+    if not occlusion.possible:
+        return tuple(np.zeros(len(mesh.triangles), bool) for mesh in meshes)
+    filled = [mesh for mesh in meshes if len(mesh.triangles)]
+    points, slack = _all_points(filled, source_points)
+    if sum(len(mesh.triangles) for mesh in filled) * len(points) > MOST_PAIRS_FOR_EACH:
+        return None
+    corners = (mesh.positions[mesh.triangles].astype(np.float64) for mesh in meshes)
+    return tuple(~_have_all_on_one_side(triangles, points, source_directions, slack) for triangles in corners)
+
+
+def _all_points(filled: Sequence[Mesh], source_points: Float64 | None) -> tuple[Float64, float]:
+    """(p, 3) vertices in use and source points, each once, and how near to a plane a point is in it."""
+    points = np.concatenate([mesh.positions[np.unique(mesh.triangles)] for mesh in filled]).astype(np.float64)
+    if source_points is not None:
+        points = np.concatenate([points, source_points])
+    points = np.unique(points, axis=0)
+    return points, _SLACK * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+
+
+def _have_all_on_one_side(corners: Float64, points: Float64, directions: Float64, slack: float) -> Bools:
+    """Which of (t, 3, 3) triangles have all of (p, 3) points, and all that lies far in (d, 3) directions, on one side
+    of their plane, the points within `slack` of it.
 
     Triangles without area occlude nothing. False for what is not finite.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
-    if not np.isfinite(lengths).all():
-        return False
-    solid = lengths > 0.0
-    normals, a = normals[solid] / lengths[solid, None], a[solid]
+    normals = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
     heights = normals @ points.T - np.einsum("ij,ij->i", normals, a)[:, None]
     slopes = normals @ directions.T
     above = (heights >= -slack).all(axis=1) & (slopes >= 0.0).all(axis=1)
     below = (heights <= slack).all(axis=1) & (slopes <= 0.0).all(axis=1)
-    one_side = above | below
-    return bool(one_side.all())
+    return np.asarray((lengths == 0.0) | above | below)

@@ -7,7 +7,7 @@ World space, metres, linear Rec.709, watts, radians. One Blender unit is one met
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -96,6 +96,13 @@ class Mesh:
     reflectance: Float32
     emission: Float32
     dynamic: bool = False
+
+    def subset(self, chosen: npt.NDArray[np.bool_]) -> Mesh:
+        """The mesh with the triangles of `chosen`, (t,) bool, and all vertices."""
+        names = ("triangles", "corner_normals", "corner_uvs", "material_indices", "tag_ids", "reflectance", "emission")
+        rows = {name: getattr(self, name)[chosen] for name in names}
+        colors = self.corner_colors[chosen] if len(self.corner_colors) else self.corner_colors
+        return replace(self, corner_colors=colors, **rows)
 
     def bounds(self) -> tuple[Float64, Float64]:
         """Lower and upper corner, (3,) float64 each, of its vertices, of which there is at least one."""

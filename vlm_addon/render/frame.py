@@ -82,7 +82,9 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
         with timer.measure("world lights"):
             world, direct_world = _world_lights(stage, snapshot)
     with timer.measure("plan"):
-        planner = FramePlanner(stage.kept, snapshot, light_mesh, world, technique_type.facts(chosen), settings)
+        planner = FramePlanner(
+            stage.kept, snapshot, light_mesh, (*world, *direct_world), technique_type.facts(chosen), settings
+        )
     plan = planner.plan
     if not plan.runs("world_lights"):
         world = direct_world = ()
@@ -93,7 +95,7 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
     step(progress, 0.0, "geometry")
     with timer.measure("geometry"):
         geometry = kept_geometry(context, stage.kept, lit, space)
-    still = StillLamps(ShadowCasters(context, stage.kept, lit), stage.kept, lit.lights, space)
+    still = StillLamps(ShadowCasters(context, stage.kept, lit, planner.occluders), stage.kept, lit.lights, space)
     cast = _casting(local.lights, plan)
     shadows = LampShadows(context, shaders, geometry, cast, settings.shadow_resolution, still)
     # A sun is the same in every space.

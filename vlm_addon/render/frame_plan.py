@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core.effects import EffectPlan, parse_choices, plan_effects
 from ..core.light_mesh import VirtualLightMesh
-from ..core.occluders import Occlusion, find_occlusion
-from ..core.reach import BOUNDED_KINDS
+from ..core.occluders import Occlusion, find_occlusion, occluding_triangles
+from ..core.reach import BOUNDED_KINDS, Bools
 from ..core.scene import Float64, Light, SceneSnapshot
 from ..core.scene_facts import ScreenFacts, TechniqueFacts, gather_facts, lamp_facts, lamp_sources, lights_picture
 from .frame_types import RenderSettings
@@ -19,7 +19,8 @@ from .kept import Kept
 
 
 class FramePlanner:
-    """Facts of one frame; `plan` is that of all of it so far."""
+    """Facts of one frame; `plan` is that of all of it so far. occluders: triangles of each mesh that may stand before
+    a surface as its lights see it; None for all."""
 
     def __init__(
         self,
@@ -30,13 +31,14 @@ class FramePlanner:
         technique: TechniqueFacts,
         settings: RenderSettings,
     ) -> None:
-        """snapshot: in world space. world_lights: suns that stand for its world. Raises InvalidInput for an unknown
+        """snapshot: in world space. world_lights: all suns that stand for its world. Raises InvalidInput for an unknown
         effect."""
         self._choices, _ = parse_choices(settings.effects)
         self._economical = settings.economical
         self._snapshot = snapshot
-        occlusion, lamp_occlusion = _occlusions(kept, snapshot, light_mesh, world_lights)
-        self._facts = gather_facts(snapshot, light_mesh, technique, occlusion, lamp_occlusion, settings.samples)
+        occlusion, found = _occlusions(kept, snapshot, light_mesh, world_lights)
+        self.occluders = found.triangles
+        self._facts = gather_facts(snapshot, light_mesh, technique, occlusion, found.occlusion, settings.samples)
         self.plan = plan_effects(self._facts, self._choices, economical=self._economical)
         self._pictures = 0
 
@@ -65,17 +67,27 @@ class FramePlanner:
         return np.where(reach, shares, 0.0)
 
 
+@dataclass(frozen=True)
+class _Occluders:
+    """Of light from lamps and world. triangles: as core.occluders.occluding_triangles."""
+
+    occlusion: Occlusion
+    triangles: tuple[Bools, ...] | None
+
+
 def _occlusions(
     kept: Kept, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, world_lights: Sequence[Light]
-) -> tuple[Occlusion, Occlusion]:
-    """Between surfaces, and of light from lamps and world, too."""
+) -> tuple[Occlusion, _Occluders]:
+    """Of light between surfaces, and of that from lamps and world, too."""
     meshes = snapshot.meshes
-    points = None if light_mesh is None else light_mesh.samples.positions
+    points = np.zeros((0, 3)) if light_mesh is None else light_mesh.samples.positions
     key = kept.digests.of([[mesh.positions, mesh.triangles] for mesh in meshes], points)
     between = kept.get("occlusion", key, lambda: find_occlusion(meshes, points))
-    if between.possible:
-        return between, between
     sources, directions = lamp_sources((*snapshot.lights, *world_lights))
-    starts = sources if points is None else np.concatenate([points, sources])
-    lamp_key = kept.digests.of(key, sources, directions)
-    return between, kept.get("lamp_occlusion", lamp_key, lambda: find_occlusion(meshes, starts, directions))
+    starts = np.concatenate([points, sources])
+
+    def find() -> _Occluders:
+        occlusion = between if between.possible else find_occlusion(meshes, starts, directions)
+        return _Occluders(occlusion, occluding_triangles(meshes, occlusion, starts, directions))
+
+    return between, kept.get("occluders", kept.digests.of(key, sources, directions), find)

@@ -7,13 +7,14 @@ Maps drawn from it stay right while the lamp and what it can shine on stay as th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.reach import box_corners, in_reach
-from ..core.scene import NO_TEXTURE, Float64, Light, Material, SceneSnapshot
+from ..core.reach import Bools, box_corners, in_reach
+from ..core.scene import NO_TEXTURE, Float64, Light, Material, Mesh, SceneSnapshot
 from .geometry import GpuGeometry
 from .kept import Kept
 from .local_space import make_still_space
@@ -30,9 +31,17 @@ class ShadowCasters:
     """Of one frame; what is on the device is kept over frames. space: of the casters. low, high: (3,) float64, bounds
     of the whole scene there. triangle_count, has_alpha: as GpuGeometry."""
 
-    def __init__(self, context: moderngl.Context, kept: Kept, world: SceneSnapshot) -> None:
-        """world: the snapshot in world space."""
-        meshes = tuple(mesh for mesh in world.meshes if len(mesh.triangles))
+    def __init__(
+        self,
+        context: moderngl.Context,
+        kept: Kept,
+        world: SceneSnapshot,
+        occluders: Sequence[Bools] | None = None,
+    ) -> None:
+        """world: the snapshot in world space. occluders: which triangles of each mesh may stand before another; None
+        for all."""
+        casting = world.meshes if occluders is None else map(_part, world.meshes, occluders)
+        meshes = tuple(mesh for mesh in casting if len(mesh.triangles))
         materials = world.materials or (Material("default"),)
         bounds = world.bounds()
         self.space = make_still_space(*bounds)
@@ -82,6 +91,11 @@ class ShadowCasters:
             bounds = corners.min(axis=0), corners.max(axis=0)
         keys = [key for key, is_chosen in zip(self._keys, chosen, strict=True) if is_chosen]
         return self._kept.digests.of(self.space, keys, bounds), bounds
+
+
+def _part(mesh: Mesh, chosen: Bools) -> Mesh:
+    """The mesh itself where all of it is chosen."""
+    return mesh if chosen.all() else mesh.subset(chosen)
 
 
 def _alpha_key(material: Material, textures: list[str]) -> str:
