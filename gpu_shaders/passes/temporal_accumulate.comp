@@ -7,11 +7,11 @@ layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
 
 layout(binding = FOUND_UNIT) uniform sampler2D found_now;
 layout(binding = REPROJECTED_UNIT) uniform sampler2D reprojected;
-layout(binding = AGE_UNIT) uniform sampler2D age;
+layout(binding = AGE_UNIT) uniform sampler2D age;  // and deviation of what earlier pictures found
 layout(std430, binding = COUNT_BINDING) readonly buffer Counts { uint shown_pixels, near_pixels; };
 layout(rgba32f, binding = 0) writeonly uniform image2D history_value;
 layout(rgba32f, binding = 1) writeonly uniform image2D history_place;
-layout(rgba16f, binding = 2) writeonly uniform image2D history_normal;
+layout(rgba16f, binding = 2) writeonly uniform image2D history_normal;   // w: deviation, largest of the channels
 layout(rgba32f, binding = 3) writeonly uniform image2D result;
 
 uniform float most_age;
@@ -21,6 +21,7 @@ uniform float cut_share;        // of the surface's pixels must have a history n
 uniform float pixel_at_0, pixel_per_depth; // a pixel's size: pixel_at_0 + pixel_per_depth x depth
 
 #define REACH 2                 // pixels to each side that are the neighbourhood
+#define LARGEST_HALF 6e4
 #define LEAST_NEIGHBOURS 4      // of fewer, mean and deviation say nothing
 
 bool is_usable(vec4 value) {
@@ -38,8 +39,14 @@ bool is_same_surface(ivec2 pixel, ivec2 other) {
             > SAME_NORMAL_COSINE;
 }
 
+float largest(vec4 v) {
+    return max(max(v.x, v.y), max(v.z, v.w));
+}
+
 // `earlier` held within clamp_width standard deviations of the mean of what pixels of one surface found around `pixel`.
-vec4 held(ivec2 pixel, vec4 earlier) {
+// deviation: of the pixel over time, which counts where the pixels around happen to agree: of rare events most
+// neighbourhoods see none. Where `earlier` is changed, that of the neighbourhood takes its place.
+vec4 held(ivec2 pixel, vec4 earlier, inout float deviation) {
     vec4 sum = vec4(0.0);
     vec4 squares = vec4(0.0);
     float count = 0.0;
@@ -64,8 +71,11 @@ vec4 held(ivec2 pixel, vec4 earlier) {
         return earlier;
     }
     vec4 mean = sum / count;
-    vec4 deviation = clamp_width * sqrt(max(squares - sum * mean, 0.0) / (count - 1.0));
-    return clamp(earlier, origin + mean - deviation, origin + mean + deviation);
+    vec4 around = sqrt(max(squares - sum * mean, 0.0) / (count - 1.0));
+    vec4 width = clamp_width * max(around, deviation);
+    vec4 kept = clamp(earlier, origin + mean - width, origin + mean + width);
+    deviation = kept == earlier ? deviation : largest(around);
+    return kept;
 }
 
 // Between a history, which may be anything where it does not count, and what is found now.
@@ -81,9 +91,11 @@ void main() {
     vec4 mean = vec4(0.0);
     vec4 shown = vec4(0.0);
     float pictures = 0.0;
+    float deviation = 0.0;
     if (pixel_shows_geometry(pixel)) {
         vec4 now = texelFetch(found_now, pixel, 0);
         float before = texelFetch(age, pixel, 0).x;
+        deviation = texelFetch(age, pixel, 0).y;
         if (float(near_pixels) < cut_share * float(shown_pixels)) {
             before = 0.0;
         }
@@ -94,12 +106,14 @@ void main() {
             pictures = before;
         } else {
             if (before > 0.0 && clamp_width > 0.0) {
-                vec4 kept = held(pixel, earlier);
+                vec4 kept = held(pixel, earlier, deviation);
                 // What had to be changed is no mean of anything: it counts as one picture.
                 before = kept == earlier ? before : 1.0;
                 earlier = kept;
             }
             pictures = before + 1.0;
+            float step = before > 0.0 ? largest(abs(now - earlier)) : 0.0;
+            deviation = before > 0.0 ? sqrt((deviation * deviation + step * step / pictures) * before / pictures) : 0.0;
             mean = max(mixed(earlier, now, 1.0 / pictures), 0.0);
             // The frame averages what its pictures show. Weights that grow make its average the mean of all pictures,
             // of this frame and before: so much of this one as to bring k times the mean of k - 1 pictures to k's.
@@ -109,6 +123,7 @@ void main() {
     }
     imageStore(history_value, pixel, mean);
     imageStore(history_place, pixel, vec4(texelFetch(gbuffer_position, pixel, 0).xyz, pictures));
-    imageStore(history_normal, pixel, vec4(texelFetch(gbuffer_shading_normal, pixel, 0).xyz, 0.0));
+    vec3 normal = texelFetch(gbuffer_shading_normal, pixel, 0).xyz;
+    imageStore(history_normal, pixel, vec4(normal, min(deviation, LARGEST_HALF)));
     imageStore(result, pixel, shown);
 }

@@ -13,7 +13,11 @@ layout(binding = HISTORY_IRRADIANCE_UNIT) uniform sampler2D history_irradiance;
 layout(binding = HISTORY_PLACE_UNIT) uniform sampler2D history_place;   // its own local space; w: age, 0 for nothing
 layout(binding = HISTORY_NORMAL_UNIT) uniform sampler2D history_normal;
 layout(rgba32f, binding = 0) writeonly uniform image2D reprojected;
+#ifdef ACCUMULATES
+layout(rg32f, binding = 1) writeonly uniform image2D age;               // and deviation of what pictures found
+#else
 layout(r32f, binding = 1) writeonly uniform image2D age;                // pictures in the mean; 0 where there is none
+#endif
 #ifdef HAS_MOTION
 layout(binding = PLACE_BEFORE_UNIT) uniform sampler2D place_before;     // w: whether there is one
 layout(binding = NORMAL_BEFORE_UNIT) uniform sampler2D normal_before;
@@ -55,10 +59,12 @@ bool is_of_surface(ivec2 texel, vec3 p, vec3 n, vec3 plane, float reach) {
         && is_usable(texelFetch(history_irradiance, texel, 0));
 }
 
-// pictures: in the mean, 0 for no history. is_near: whether that is near by in the picture and seen alike.
-vec4 history_of(ivec2 pixel, out float pictures, out bool is_near) {
+// pictures: in the mean, 0 for no history. is_near: whether that is near by in the picture and seen alike. deviation: of
+// what pictures found.
+vec4 history_of(ivec2 pixel, out float pictures, out bool is_near, out float deviation) {
     pictures = 0.0;
     is_near = false;
+    deviation = 0.0;
 #ifdef HAS_MOTION
     vec4 before = texelFetch(place_before, pixel, 0);
     if (before.w == 0.0) {
@@ -107,6 +113,7 @@ vec4 history_of(ivec2 pixel, out float pictures, out bool is_near) {
         if (is_of_surface(texel, p, n, plane, reach)) {
             sum += weight * texelFetch(history_irradiance, texel, 0);
             total += weight;
+            deviation = max(deviation, texelFetch(history_normal, texel, 0).w);
             pictures = min(pictures, texelFetch(history_place, texel, 0).w);
         }
     }
@@ -119,6 +126,7 @@ vec4 history_of(ivec2 pixel, out float pictures, out bool is_near) {
         if (is_inside && is_of_surface(texel, p, n, plane, reach)) {
             sum = texelFetch(history_irradiance, texel, 0);
             total = 1.0;
+            deviation = texelFetch(history_normal, texel, 0).w;
             pictures = min(pictures, texelFetch(history_place, texel, 0).w);
         }
     }
@@ -137,9 +145,10 @@ void main() {
     }
     float pictures = 0.0;
     bool is_near = false;
+    float deviation = 0.0;
     vec4 found = vec4(0.0);
     if (most_age > 0.0 && pixel_shows_geometry(pixel)) {
-        found = history_of(pixel, pictures, is_near);
+        found = history_of(pixel, pictures, is_near, deviation);
     }
 #ifdef ACCUMULATES
     if (pixel_shows_geometry(pixel)) {
@@ -148,5 +157,5 @@ void main() {
     }
 #endif
     imageStore(reprojected, pixel, found);
-    imageStore(age, pixel, vec4(pictures));
+    imageStore(age, pixel, vec4(pictures, deviation, 0.0, 0.0));
 }

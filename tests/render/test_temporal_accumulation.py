@@ -233,6 +233,17 @@ def test_nothing_is_held_to_its_neighbours_where_nothing_changes(sequence: Pictu
         np.testing.assert_allclose(picture.mean[inside(picture.faces, picture.shown)][:, 0], 6.0 * share, atol=1e-5)
 
 
+def test_rare_events_still_count_where_something_changes(sequence: PictureSequence) -> None:
+    """Most neighbourhoods see none of them in a picture: if these decided alone, there would never have been any."""
+    chance, means = 0.02, []
+    for index in range(30):
+        values = 10.0 * (noise(index)[..., 0] < chance)
+        picture = sequence.picture(box_room(), given(values), scene_key=str(index))
+        means.append(picture.mean[..., 0][picture.shown].mean())
+    # Of neighbourhoods alone comes 15 % of it.
+    assert abs(np.mean(means[10:]) / (10.0 * chance) - 1.0) < 0.1
+
+
 def test_changes_limit_the_history_and_it_grows_again(sequence: PictureSequence) -> None:
     ages = []
     for index in range(24):

@@ -2,13 +2,15 @@
 """Accumulates what any noisy pass finds over pictures: occlusion, reflections, filtered light.
 
     accumulator = Accumulator(context, shaders, kept, "ambient_occlusion", width, height, settings)
+    occlusion = occlusion_pass.render(gbuffer, view, accumulator.pictures)
     occlusion = accumulator.render(gbuffer, view, space, occlusion, key, scene_key, motion)
 
 A pixel's history is what the last picture had where it showed the same surface: at the same place, or, for meshes that
 moved or deformed, where `MotionPass` says that they were. While something changes, history counts for little and is
-held near to what the neighbouring pixels have now (variance clipping), so that nothing trails; while nothing does, the
-result goes to the mean. A cut takes nothing over: other keys, or a picture that shows other places or the same ones
-elsewhere. Values that are not numbers are replaced by the history, or by 0.
+held near to what the neighbouring pixels have now (variance clipping by what deviates around or over time, whichever is
+more), so that nothing trails and rare events still count; while nothing does, the result goes to the mean. A cut takes
+nothing over: other keys, or a picture that shows other places or the same ones elsewhere. Values that are not numbers
+are replaced by the history, or by 0.
 """
 
 from __future__ import annotations
@@ -81,7 +83,8 @@ class AccumulationSettings:
 
 
 class AccumulatedHistory(History):
-    """A history that knows what else it was made from. unsettled: pictures until what changed counts as settled."""
+    """A history that knows what else it was made from. normal: its w is the deviation of what pictures found, of the
+    channel that has most. unsettled: pictures until what changed counts as settled."""
 
     def __init__(self, context: moderngl.Context, width: int, height: int) -> None:
         super().__init__(context, width, height)
@@ -117,7 +120,7 @@ class Accumulator:
             histories[size] = AccumulatedHistory(context, width, height)
         self._history = histories[size]
         self._reprojected, self._result = (context.texture(size, 4, dtype="f4") for _ in range(2))
-        self._age = context.texture(size, 1, dtype="f4")
+        self._age = context.texture(size, 2, dtype="f4")
         self._counts = context.buffer(bytes(8))
         self._groups = -(-width // GROUP_SIDE), -(-height // GROUP_SIDE)
         self._defines = {
@@ -128,6 +131,12 @@ class Accumulator:
             "MOST_MAGNIFIED": MOST_MAGNIFIED,
             "LEAST_VIEW_COSINE": LEAST_VIEW_COSINE,
         }
+
+    @property
+    def pictures(self) -> int:
+        """That the owner has had so far, over frames. What it finds must differ from picture to picture: as
+        `sample_index` of the pass that is averaged, 0 in the first one as without a history."""
+        return self._history.step
 
     def render(
         self,
