@@ -216,15 +216,18 @@ def test_lights_and_surfaces_that_do_not_go_together_are_told(device: Device) ->
     lights = lights_of(scene)
 
     def told(scene: SceneSnapshot, lights: VirtualLightMesh, **chosen: object) -> str:
-        return "\n".join(render(device, scene, lights, rest="direct", **chosen).reasons)
+        return "\n".join(render(device, scene, lights, **{"rest": "rsm_gather", **chosen}).reasons)
 
     right = told(scene, lights)
-    assert "flag: bounces by 8 virtual lights, all else by direct" in right
+    assert "flag bounces by 8 virtual lights, all else by rsm_gather" in right
     assert "missing" not in right
     assert "twice" not in right
     still = replace(lights, dynamic=np.zeros(len(lights), bool))
     assert "the bounce off flag is missing" in told(scene, still)
-    assert "may be counted twice" in told(room_with_flag(is_dynamic=False), lights)
+    assert "8 virtual lights is counted twice" in told(room_with_flag(is_dynamic=False), lights)
+    # There no surface bounces by itself.
+    assert "missing" not in told(scene, still, rest="vlm")
+    assert "twice" not in told(room_with_flag(is_dynamic=False), lights, rest="vlm")
     assert "light is missing" in told(scene, replace(lights, strength=0.4 * lights.strength))
     assert "light is counted twice" in told(scene, replace(lights, strength=3.0 * lights.strength))
     assert "nothing has one of the tags 3, 4" in told(scene, lights, chosen=TAGGED, tags="3, 4")

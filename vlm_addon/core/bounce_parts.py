@@ -76,14 +76,14 @@ def _without_bounce(mesh: Mesh, chosen: Bools, materials: list[Material], black:
     """black: the black material of each that has one; `materials` grows by new ones."""
     if not chosen.any():
         return mesh
-    used, places = np.unique(mesh.material_indices[chosen], return_inverse=True)
-    for index in used.tolist():
+    turned = np.zeros(len(materials), np.int32)
+    for index in np.flatnonzero(np.bincount(mesh.material_indices[chosen])).tolist():
         if index not in black:
             black[index] = len(materials)
             materials.append(_black(materials[index]))
-    indices, reflectance, emission = mesh.material_indices.copy(), mesh.reflectance.copy(), mesh.emission.copy()
-    indices[chosen] = np.array([black[index] for index in used.tolist()], np.int32)[places]
-    reflectance[chosen] = emission[chosen] = 0.0
+        turned[index] = black[index]
+    indices = np.where(chosen, turned[mesh.material_indices], mesh.material_indices)
+    reflectance, emission = (np.where(chosen[:, None], np.float32(0.0), of) for of in (mesh.reflectance, mesh.emission))
     return replace(mesh, material_indices=indices, reflectance=reflectance, emission=emission)
 
 

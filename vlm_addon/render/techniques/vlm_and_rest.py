@@ -5,20 +5,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.bounce_parts import DYNAMIC, TAGGED, Choice, Reflected, reflected, tag_spans, without_bounce
+from ...core.bounce_parts import DYNAMIC, TAGGED, Choice, Reflected, tag_spans
 from ...core.progress import Progress
 from ...core.scene import Float32
 from ...core.scene_facts import OWN_SPECULAR, TechniqueFacts
 from ...core.settings import describe, setting
-from ..device import PassTimer
 from ..passes.accumulate import read_image
 from ..passes.phase_two import IrradianceImage
+from ..scene_parts import PartTimer, chosen_inputs, kept_reflected, rest_inputs
 from ..technique import FrameInputs, SceneInputs, Technique
 from . import vlm
 from .direct import Direct
@@ -46,6 +45,9 @@ OTHERS: tuple[type[Technique], ...] = (
 """What the rest may bounce by: every other technique."""
 WITHOUT_SURFACES = (LightWave.name, ScaledDirect.name)
 """Of those, techniques whose light comes from lamps alone: no surface can be taken out of them."""
+BY_LIGHTS_ALONE = (VirtualLightMeshTechnique.name, Direct.name)
+"""Techniques in which no surface bounces by itself, so that none is missing or counted twice."""
+MOST_NAMES = 5
 CHOSEN, REST, SHOWN = "chosen", "rest", "shown"
 MOST_APART = 2.0
 """Times that chosen lights may reflect more, or less, than chosen surfaces before it is told."""
@@ -138,6 +140,7 @@ class VlmAndRest(Technique):
             name=cls.name,
             knows_visibility=chosen.knows_visibility or rest.knows_visibility,
             asks_visibility=chosen.asks_visibility or rest.asks_visibility,
+            bounces_without_lights=not rest.has_reflecting_lights,
             specular=rest.specular if rest.specular == OWN_SPECULAR else chosen.specular,
         )
 
@@ -146,16 +149,16 @@ class VlmAndRest(Technique):
         assert scene.light_mesh is not None
         assert scene.world_lights is not None
         choice = Choice(settings.chosen, tag_spans(settings.tags))
-        self._reflected = reflected(scene.world, scene.world_lights, choice)
+        self._reflected = kept_reflected(scene, choice)
         self._parts: dict[str, Technique] = {}
         self._found: dict[str, moderngl.Texture] = {}
         self._shown: tuple[GpuVirtualLights, moderngl.Buffer] | None = None
         second, own = _second(settings)
         chosen_progress, rest_progress = _halves(scene.progress)
         if self._reflected.lights:
-            inputs = replace(_chosen_inputs(scene, choice), progress=chosen_progress)
+            inputs = replace(chosen_inputs(scene, choice, CHOSEN), progress=chosen_progress)
             self._parts[CHOSEN] = VirtualLightMeshTechnique(inputs, settings)
-        inputs = replace(_rest_inputs(scene, choice), progress=rest_progress)
+        inputs = replace(rest_inputs(scene, choice, REST), progress=rest_progress)
         self._has_rest = _has_rest(second, self._reflected, inputs)
         if self._has_rest:
             self._parts[REST] = second(inputs, own)
@@ -189,7 +192,7 @@ class VlmAndRest(Technique):
         """All lights of the light mesh: no diffuse light is counted twice by what shows in glossy surfaces."""
         if self._shown is None:
             kept = self.scene.kept.part(SHOWN)
-            inputs = replace(self.scene, kept=kept, timer=_PartTimer(self.scene.timer, SHOWN))
+            inputs = replace(self.scene, kept=kept, timer=PartTimer(self.scene.timer, SHOWN))
             self._shown = VirtualLightMeshTechnique(inputs, vlm.Settings(lights=vlm.ALL)).reflecting_lights()
         return self._shown
 
@@ -219,50 +222,6 @@ class VlmAndRest(Technique):
         return found + [f"{name}: {text}" for name, part in self._parts.items() for text in part.reasons()]
 
 
-class _PartTimer(PassTimer):
-    """Measures passes under the name of their part."""
-
-    def __init__(self, timer: PassTimer, part: str) -> None:
-        self._timer, self._part = timer, part
-
-    @property
-    def kind(self) -> str:
-        return self._timer.kind
-
-    def measure(self, name: str) -> AbstractContextManager[None]:  # type: ignore[override]
-        return self._timer.measure(f"{self._part}: {name}")
-
-    def timings(self) -> list[tuple[str, float]]:
-        return self._timer.timings()
-
-
-def _chosen_inputs(scene: SceneInputs, choice: Choice) -> SceneInputs:
-    """The whole scene, with chosen lights alone."""
-    return replace(_with_lights(scene, choice, is_chosen=True), timer=_PartTimer(scene.timer, CHOSEN))
-
-
-def _rest_inputs(scene: SceneInputs, choice: Choice) -> SceneInputs:
-    """The scene whose chosen surfaces bounce nothing, without their lights. What is kept for it is kept apart, so that
-    neither part makes the other's anew with each frame."""
-    kept = scene.kept.part(REST)
-    return replace(
-        _with_lights(scene, choice, is_chosen=False),
-        timer=_PartTimer(scene.timer, REST),
-        snapshot=without_bounce(scene.snapshot, choice),
-        world=without_bounce(scene.world, choice),
-        kept=kept,
-        structures=scene.structures.kept_in(kept),
-    )
-
-
-def _with_lights(scene: SceneInputs, choice: Choice, is_chosen: bool) -> SceneInputs:
-    assert scene.light_mesh is not None
-    assert scene.world_lights is not None
-    rows = choice.lights(scene.light_mesh) == is_chosen
-    local, world = scene.light_mesh.subset(rows), scene.world_lights.subset(rows)
-    return replace(scene, light_mesh=local, world_lights=world)
-
-
 def _has_rest(second: type[Technique], chosen: Reflected, inputs: SceneInputs) -> bool:
     """Whether anything is left for the second technique."""
     if second.needs_light_mesh:
@@ -280,13 +239,18 @@ def _halves(progress: Progress) -> tuple[Progress, Progress]:
 def _balance_texts(chosen: Reflected, settings: Any) -> list[str]:
     """What is chosen, and whether lights and surfaces that are chosen go together."""
     kind = "moves" if settings.chosen == DYNAMIC else f"has one of the tags {settings.tags or '(none given)'}"
+    names = ", ".join(chosen.names[:MOST_NAMES])
+    if len(chosen.names) > MOST_NAMES:
+        names += f" and {len(chosen.names) - MOST_NAMES:,} more"
     if not chosen.triangles and not chosen.lights:
         return [f"nothing {kind}: all bounces by {settings.rest}"]
+    found = [f"{names or 'nothing'} bounces by {chosen.lights:,} virtual lights, all else by {settings.rest}"]
+    if settings.rest in BY_LIGHTS_ALONE:
+        return found
     if not chosen.lights:
-        return [f"no virtual light {kind}: the bounce off {', '.join(chosen.names)} is missing"]
+        return [f"no virtual light {kind}: the bounce off {names} is missing"]
     if not chosen.triangles:
-        return [f"no surface {kind}: the light of {chosen.lights:,} virtual lights may be counted twice"]
-    found = [f"{', '.join(chosen.names)}: bounces by {chosen.lights:,} virtual lights, all else by {settings.rest}"]
+        return [f"no surface {kind}: the light of {chosen.lights:,} virtual lights is counted twice"]
     low, high = sorted((chosen.of_surfaces, chosen.of_lights))
     if high > MOST_APART * low:
         is_missing = chosen.of_lights < chosen.of_surfaces
