@@ -11,6 +11,7 @@ import pytest
 from tests.render.test_shadow_map import FLOOR, LAMPS, RESOLUTION, SCALES, box, floor_points, lit, mesh, scaled, up
 from vlm_addon.core.scene import Light
 from vlm_addon.render.device import Device
+from vlm_addon.render.local_space import LocalSpace
 
 # All shine from +x over a wall of 1 m at x = 0.
 BESIDE = {"x_axis": (0.8, 0.0, -0.6), "y_axis": (0.0, 1.0, 0.0), "z_axis": (0.6, 0.0, 0.8)}
@@ -47,16 +48,25 @@ def row(x: np.ndarray) -> np.ndarray:
     return np.stack([x, np.full(len(x), 0.1), np.zeros(len(x))], axis=1)
 
 
+def kept_elsewhere(scale: float) -> LocalSpace:
+    """A space at one end of the scene, in which points are asked for while the map is drawn in its own."""
+    return LocalSpace(scale * np.array([2.9, -2.7, 0.1]), 0.0037 * scale)
+
+
+@pytest.mark.parametrize("is_kept", [False, True], ids=["same space", "kept map"])
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("thickness", list(WALLS))
 @pytest.mark.parametrize("name", list(CONTACT_LAMPS))
-def test_shadow_touches_its_wall_and_does_not_leak(device: Device, name: str, thickness: str, scale: float) -> None:
+def test_shadow_touches_its_wall_and_does_not_leak(
+    device: Device, name: str, thickness: str, scale: float, is_kept: bool
+) -> None:
     """Dark from one texel behind the lit foot on, under the wall too; lit from one texel before it on."""
     texel = TEXELS[name]
     behind, before = np.linspace(-0.6, -texel, 300), np.linspace(texel, 0.8, 300)
     scene = [mesh(FLOOR + wall(WALLS[thickness]), scale)]
+    eye = kept_elsewhere(scale) if is_kept else None
     light = resized(CONTACT_LAMPS[name], scale)
-    share = lit(device, scene, light, scale * row(np.concatenate([behind, before])), up(600))
+    share = lit(device, scene, light, scale * row(np.concatenate([behind, before])), up(600), eye=eye)
     np.testing.assert_allclose(share[:300], 0.0, atol=1e-6)
     np.testing.assert_allclose(share[300:], 1.0, rtol=1e-3)
 

@@ -106,6 +106,7 @@ def test_a_frame_in_which_nothing_changed_builds_nothing(used: Device) -> None:
     assert first.images["direct"].max() > 0.0
 
 
+NEAR_CAMERA = camera_at((0.0, -0.8, 0.6), (0.0, 0.5, 0.3))
 MOVED_CAMERA = camera_at((-1.0, -4.0, 1.5), (0.0, 0.5, 0.5))
 
 
@@ -116,6 +117,31 @@ def test_a_camera_that_moves_draws_no_shadow_map_and_no_light(used: Device) -> N
     assert not kinds & {"phase one", "radiosity", "shadow casters", "materials", "texture", "lit trees"}
     assert not kinds & {"geometry normal", "geometry uv"}
     assert same(found, anew(used, moved))
+
+
+def test_windows_under_a_sun_are_drawn_where_the_camera_gets_to(used: Device) -> None:
+    """A step of 2 cm in a scene of 9 m leaves them as they are; from elsewhere there are others."""
+    under_the_sun = replace(scene(lights=(SUN_LAMP,)), world_radiance=(0.0, 0.0, 0.0), camera=NEAR_CAMERA)
+    rendered(used, under_the_sun)
+    step = replace(under_the_sun, camera=camera_at((0.02, -0.8, 0.61), (0.0, 0.5, 0.3)))
+    found = rendered(used, step)
+    assert "geometry position" in built(used)
+    assert "shadow maps" not in built(used)
+    assert same(found, anew(used, step))
+    far = replace(under_the_sun, camera=camera_at((2.0, 1.5, 0.6), (2.5, 2.5, 0.3)))
+    found = rendered(used, far)
+    assert "shadow maps" in built(used)
+    assert same(found, anew(used, far))
+
+
+def test_lamps_without_windows_are_never_drawn_for_a_camera(used: Device) -> None:
+    without = replace(scene(lights=LAMPS[:3]), world_radiance=(0.0, 0.0, 0.0))
+    rendered(used, without)
+    for camera in (MOVED_CAMERA, NEAR_CAMERA):
+        moved = replace(without, camera=camera)
+        found = rendered(used, moved)
+        assert "shadow maps" not in built(used)
+        assert same(found, anew(used, moved))
 
 
 @pytest.mark.parametrize(
@@ -141,12 +167,12 @@ def test_a_lamp_that_changes_costs_what_it_alone_costs(
     events = used.kept.events()
     assert events["phase one"].built == phase_one
     assert events["shadow maps"].built == shadow_maps
-    assert not built(used) - {"phase one", "shadow maps", "radiosity", *RELIT}
+    assert not built(used) & UNLIT
     assert same(found, anew(used, changed))
 
 
-RELIT = {"lit trees", "light forest", "scale", "window_factor", "static_clusters", "lamp_occlusion"}
-"""What depends on how much light falls where."""
+UNLIT = {"geometry", "materials", "texture", "shadow casters", "virtual lights", "static_tree", "probes"}
+"""What does not hang on lamps."""
 
 
 @pytest.mark.parametrize(("place", "spot_draws"), [((1.5, 0.3), False), ((-1.8, 0.5), True)], ids=["outside", "inside"])
@@ -171,7 +197,8 @@ def test_a_material_redraws_shadows_only_where_it_lets_light_through(used: Devic
     red = replace(MATERIALS[0], base_color=(0.9, 0.1, 0.1))
     painted = replace(scene(), materials=(red, *MATERIALS[1:]))
     found = rendered(used, painted)
-    assert built(used) == {"geometry", "materials"}
+    assert {"geometry", "materials"} <= built(used)
+    assert not built(used) & {"geometry position", "shadow maps", "phase one", "lit trees", "texture"}
     assert same(found, anew(used, painted))
     clearer = replace(painted, textures=(Texture("leaf", leaf_pixels(0.1)),))
     found = rendered(used, clearer)

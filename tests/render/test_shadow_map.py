@@ -13,8 +13,11 @@ from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, Material, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.kept import Kept
+from vlm_addon.render.local_space import LocalSpace
 from vlm_addon.render.passes.phase_one import PhaseOnePass
-from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass
+from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass, StillLamps
+from vlm_addon.render.shadow_casters import ShadowCasters
 from vlm_addon.render.shadow_views import shadow_kind
 
 RESOLUTION = 512
@@ -99,16 +102,30 @@ def probes(points: Float64, normals: Float64) -> VirtualLightMesh:
 
 
 def lit(
-    device: Device, meshes: list[Mesh], light: Light, points: Float64, normals: Float64, alpha: float = 1.0
+    device: Device,
+    meshes: list[Mesh],
+    light: Light,
+    points: Float64,
+    normals: Float64,
+    alpha: float = 1.0,
+    eye: LocalSpace | None = None,
 ) -> Float64:
-    """Share of the unshadowed light that arrives at each point."""
+    """Share of the unshadowed light that arrives at each point. eye: space of the points, where the map is kept in one
+    of its own."""
     materials = (Material("opaque"), Material("veil", alpha=alpha))
     snapshot = SceneSnapshot("scene", meshes=tuple(meshes), materials=materials, lights=(light,))
     with device.current() as context:
         geometry = GpuGeometry(context, snapshot)
-        shadows = LampShadows(context, device.shaders, geometry, snapshot.lights, RESOLUTION)
+        shadows, asked, origin = None, points, geometry.origin
+        if eye is not None:
+            kept, asked, origin = Kept(), eye.local_points(points), np.zeros(3)
+            local = eye.scene(snapshot)
+            geometry = GpuGeometry(context, local, origin)
+            still = StillLamps(ShadowCasters(context, kept, snapshot), kept, snapshot.lights, eye)
+            shadows = LampShadows(context, device.shaders, geometry, local.lights, RESOLUTION, still)
+        shadows = shadows or LampShadows(context, device.shaders, geometry, snapshot.lights, RESOLUTION)
         phase_one = PhaseOnePass(context, device.shaders)
-        found = phase_one.render(probes(points, normals), geometry.origin, shadows, [0], 16)[:, 0]
+        found = phase_one.render(probes(asked, normals), origin, shadows, [0], 16)[:, 0]
     full = lamp_irradiance(light, points, normals)[:, 0]
     assert (full > 0.0).all()
     return found / full

@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 
 from tests.render.rooms import camera_at, lights_from_triangles, quad
-from vlm_addon.core.scene import DIFFUSE, ORTHOGRAPHIC, SUN, Camera, Float64, Light, Material, Mesh, SceneSnapshot
+from vlm_addon.core.scene import (
+    DIFFUSE,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    SUN,
+    Camera,
+    Float64,
+    Light,
+    Material,
+    Mesh,
+    SceneSnapshot,
+)
 from vlm_addon.render import shadow_windows
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
@@ -19,7 +30,7 @@ from vlm_addon.render.passes.distance_range import DistanceRange
 from vlm_addon.render.passes.gbuffer import GBufferPass
 from vlm_addon.render.passes.phase_one import PhaseOnePass
 from vlm_addon.render.passes.shadow_map import LampShadows
-from vlm_addon.render.shadow_windows import FADE, WHOLE_SCENE, sample_windows, view_windows
+from vlm_addon.render.shadow_windows import FADE, WHOLE_SCENE, same_window, sample_windows, view_windows
 from vlm_addon.render.view import make_view
 
 LOW, HIGH = np.full(3, -500.0), np.full(3, 500.0)
@@ -166,6 +177,28 @@ def test_distances_to_what_shows(device: Device) -> None:
     assert nearest == pytest.approx(3.0, abs=0.01)
     assert farthest == pytest.approx((9.0 + 0.25 + 0.16) ** 0.5, abs=0.03)
     assert nothing == (np.inf, 0.0)
+
+
+@pytest.mark.parametrize("kind", [PERSPECTIVE, ORTHOGRAPHIC])
+def test_windows_in_another_space_are_the_same_from_every_space_they_come_from(kind: str) -> None:
+    """Those of an eye in five spaces around it, with units that are no powers of two, taken into one."""
+    still = (LOW + 0.3, HIGH + 0.3)
+    found = []
+    for step in range(5):
+        origin, unit = np.array([3.1, -2.7, 0.4]) * step, 0.7 + 0.13 * step
+        eye = (np.array([12.0, -7.0, 3.0]) - origin) / unit
+        camera = camera_at(eye, eye + np.array([0.3, 1.0, -0.2]), kind=kind, ortho_scale=4.0 / unit)
+        view = make_view(camera, WIDTH, HEIGHT, np.zeros(3))
+        bounds = (LOW - origin) / unit, (HIGH - origin) / unit
+        windows = [item.window for item in view_windows(view, *bounds, 2.0 / unit, 40.0 / unit) if item.window]
+        found.append([same_window(window, bounds, still) for window in windows])
+        for window, other in zip(windows, found[-1], strict=True):
+            assert other.radius == pytest.approx(unit * window.radius)
+            np.testing.assert_allclose(
+                np.subtract(other.centre, 0.3), unit * np.array(window.centre) + origin, atol=1e-6
+            )
+    assert len(found[0]) >= 1
+    assert all(windows == found[0] for windows in found)
 
 
 def test_source_samples_of_a_room_need_one_map() -> None:

@@ -14,17 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.reach import Bools, box_corners, in_reach
-from ..core.scene import NO_TEXTURE, Float64, Light, Material, Mesh, SceneSnapshot
+from ..core.scene import NO_TEXTURE, Light, Material, Mesh, SceneSnapshot
 from .geometry import GpuGeometry
 from .kept import Kept
 from .local_space import make_still_space
+from .shadow_windows import Bounds
 
 if TYPE_CHECKING:
     import moderngl
 
 KIND = "shadow casters"
-Bounds = tuple[Float64, Float64]
-"""Lower and upper corner, (3,) float64."""
 
 
 class ShadowCasters:

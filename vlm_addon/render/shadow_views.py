@@ -9,10 +9,8 @@ import numpy as np
 
 from ..core.scene import AREA, SPOT, SUN, Float64, Light
 from .gpu_layout import CONSTANTS
-from .shadow_windows import ShadowWindow
+from .shadow_windows import Bounds, ShadowWindow
 
-Bounds = tuple[Float64, Float64]
-"""Lower and upper corner of a box, (3,) float64 each."""
 Viewport = tuple[int, int, int, int]
 
 # Above this cone one perspective map wastes most of its texels on the rim.

@@ -19,6 +19,8 @@ from ..core.scene import Float64, Int32
 from .view import View
 
 Int64 = npt.NDArray[np.int64]
+Bounds = tuple[Float64, Float64]
+"""Lower and upper corner of a box, (3,) float64 each."""
 
 WHOLE_SCENE = 0
 """Index of the window that holds everything."""
@@ -91,6 +93,18 @@ def view_windows(view: View, low: Float64, high: Float64, nearest: float, farthe
             windows.append(ViewWindow(window, outer, inner if inner > nearest else 0.0))
         outer = inner
     return tuple(windows)
+
+
+def same_window(window: ShadowWindow, bounds: Bounds, other: Bounds) -> ShadowWindow:
+    """One of `view_windows` in another space, where the scene's `bounds` are `other`: the same to the bit for all eyes
+    that get it."""
+    radii = [0.5 * float(np.linalg.norm(high - low)) for low, high in (bounds, other)]
+    middles = [0.5 * (low + high) for low, high in (bounds, other)]
+    # A window's share of the scene is a power of two, its centre lies on a grid through the middle.
+    radius = radii[1] * 2.0 ** round(math.log2(window.radius / radii[0]))
+    cell = np.round((np.array(window.centre) - middles[0]) / (_GRID * window.radius))
+    x, y, z = (middles[1] + _GRID * radius * cell).tolist()
+    return ShadowWindow((x, y, z), radius)
 
 
 def _orthographic_window(view: View, middle: Float64, scene: float, nearest: float, farthest: float) -> ViewWindow:

@@ -21,8 +21,8 @@ from ..lamp_records import lamp_record
 from ..local_space import LocalSpace
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..shadow_casters import ShadowCasters
-from ..shadow_views import CUBE_TILES, Bounds, cone_widening, shadow_kind, shadow_views
-from ..shadow_windows import ShadowWindow
+from ..shadow_views import CUBE_TILES, cone_widening, shadow_kind, shadow_views
+from ..shadow_windows import Bounds, ShadowWindow, same_window
 
 if TYPE_CHECKING:
     import moderngl
@@ -38,6 +38,8 @@ SHARP_ANGLE = math.radians(4.0)
 LEAST_RESOLUTION = 16
 # Rounding of a vertex and of its interpolation, of half the scene's diagonal.
 ROUNDING = 2.0**-23
+FINEST = 2.0**-7
+"""What float32 may leave of places in the still space, texels of a map that is drawn there."""
 # Height of what a sun's map does not show, m.
 EMPTY_HEIGHT = -1e30
 KIND = "shadow maps"
@@ -181,21 +183,22 @@ class StillLamps:
 
 @dataclass(frozen=True)
 class _Source:
-    """What a lamp's maps are drawn from. light: in the space of the geometry; key: of all that they depend on but the
-    sample; bounds: of what shows in them; space: of the geometry, None for the frame's."""
+    """What a lamp's maps are drawn from. light, window: in the space of the geometry; key: of all that they depend on
+    but the sample; bounds: of what shows in them; space: of the geometry, None for the frame's."""
 
     light: Light
     key: str
     geometry: Callable[[], GpuGeometry]
     bounds: Bounds | None
-    space: LocalSpace | None
+    space: LocalSpace | None = None
+    window: ShadowWindow | None = None
 
 
 class LampShadows:
     """The maps of a scene's lamps over the samples of a frame and, with StillLamps, over frames.
 
-    The map of a whole lamp is drawn in the still space and outlasts camera moves; windows around the eye are drawn in
-    the frame's space, which has digits enough for them.
+    Maps are drawn in the still space and outlast camera moves, but for the smallest windows around the eye, for which
+    only the frame's space has digits enough.
     """
 
     def __init__(
@@ -283,7 +286,7 @@ class LampShadows:
         key = f"{source.key} {sampled}" if changes else source.key
         found = self._maps.get(key)
         if found is None:
-            found = self._draw(source, sampled, window, key, self._keeps_samples or not changes)
+            found = self._draw(source, sampled, key, self._keeps_samples or not changes)
         elif self._still is not None:
             self._still.kept.count(KIND, is_new=False)
         return ShadowMap(found.texture, self._placed(found.record, source, light, sampled))
@@ -304,27 +307,34 @@ class LampShadows:
 
     def _new_source(self, light: Light, window: ShadowWindow | None) -> _Source:
         if self._still is None:
-            return _Source(light, repr((light, window)), self._geometry, None, None)
+            return _Source(light, repr((light, window)), self._geometry, None, window=window)
         casters, digests, world = self._still.casters, self._still.kept.digests, self._world_light(light)
         size = self._pass.size(light)
         widening = cone_widening(size[0]) if shadow_kind(light) == "SHADOW_CONE" else 0.0
         seen, bounds = casters.seen_by(world, widening)
         key = digests.of(seen, _shadow_shape(world), size)
-        if window is None:
-            return _Source(casters.space.light(world), key, casters.geometry, bounds, casters.space)
-        return _Source(light, digests.of(key, window, self._space), self._geometry, self.bounds, None)
+        if window is not None and self._is_too_fine(window, size):
+            return _Source(light, digests.of(key, window, self._space), self._geometry, self.bounds, window=window)
+        if window is not None:
+            window = same_window(window, self.bounds, (casters.low, casters.high))
+            key = digests.of(key, window)
+        return _Source(casters.space.light(world), key, casters.geometry, bounds, casters.space, window)
+
+    def _is_too_fine(self, window: ShadowWindow, size: tuple[int, int]) -> bool:
+        """Whether a window shows what the still space has no digits for, or is of that space already."""
+        assert self._still is not None
+        texel = 2.0 * window.radius / size[0]
+        return self._space is self._still.casters.space or rounding(self.bounds) > FINEST * texel
 
     def _world_light(self, light: Light) -> Light:
         # A sun is the same in every space.
         return light if light.kind == SUN else self._world[light]
 
-    def _draw(
-        self, source: _Source, sampled: tuple[int, int, int], window: ShadowWindow | None, key: str, keep: bool
-    ) -> ShadowMap:
+    def _draw(self, source: _Source, sampled: tuple[int, int, int], key: str, keep: bool) -> ShadowMap:
         size = self._pass.size(source.light)
         keep = keep and self._maps.has_room(size)
         texture = None if keep else self._shared.get(size)
-        found = self._pass.render(source.geometry(), source.light, *sampled, texture, window, source.bounds)
+        found = self._pass.render(source.geometry(), source.light, *sampled, texture, source.window, source.bounds)
         if keep:
             self._maps.add(key, found)
         else:
