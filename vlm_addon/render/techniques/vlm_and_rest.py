@@ -55,8 +55,8 @@ GROUP_SIDE = 8
 
 
 @dataclass(frozen=True)
-class Division(vlm.Settings):
-    """Who bounces by what; and how the light mesh's lights are summed."""
+class Division:
+    """Who bounces by what."""
 
     chosen: str = setting(
         DYNAMIC,
@@ -112,7 +112,7 @@ def _second(settings: Any) -> tuple[type[Technique], Any]:
     return technique, technique.settings(**own)
 
 
-Settings = dataclasses.make_dataclass("Settings", _settings_of_others(), bases=(Division,), frozen=True)
+Settings = dataclasses.make_dataclass("Settings", _settings_of_others(), bases=(vlm.Settings, Division), frozen=True)
 
 
 class VlmAndRest(Technique):
