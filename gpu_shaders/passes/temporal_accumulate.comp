@@ -17,6 +17,7 @@ layout(rgba32f, binding = 3) writeonly uniform image2D result;
 uniform float most_age;
 uniform float pictures_of_frame; // so far, with this one
 uniform float clamp_width;      // standard deviations; 0 takes earlier pictures as they are
+uniform float mirror_age;       // most pictures of a history where a surface is ROUGH, none at a MIRROR; below 0: any
 uniform float cut_share;        // of the surface's pixels must have a history near by, or none counts
 uniform float pixel_at_0, pixel_per_depth; // a pixel's size: pixel_at_0 + pixel_per_depth x depth
 
@@ -99,6 +100,10 @@ void main() {
         if (float(near_pixels) < cut_share * float(shown_pixels)) {
             before = 0.0;
         }
+        if (mirror_age >= 0.0) {
+            float roughness = texelFetch(gbuffer_shading_normal, pixel, 0).w;
+            before = min(before, mirror_age * smoothstep(MIRROR, ROUGH, roughness));
+        }
         vec4 earlier = texelFetch(reprojected, pixel, 0);
         if (!is_usable(now)) {
             mean = before > 0.0 ? earlier : vec4(0.0);
@@ -108,7 +113,7 @@ void main() {
             if (before > 0.0 && clamp_width > 0.0) {
                 vec4 kept = held(pixel, earlier, deviation);
                 // What had to be changed is no mean of anything: it counts as one picture.
-                before = kept == earlier ? before : 1.0;
+                before = kept == earlier ? before : min(before, 1.0);
                 earlier = kept;
             }
             pictures = before + 1.0;

@@ -270,6 +270,21 @@ def test_what_follows_the_eye_changes_with_it(sequence: PictureSequence, follows
     assert (far.age[far.shown] == 1.0).all() or not follows_eye
 
 
+@pytest.mark.parametrize(("roughness", "age"), [(0.0, 1.0), (0.05, 1.0), (0.175, 5.0), (0.3, 9.0), (1.0, 9.0)])
+def test_mirrors_have_no_noise_and_are_not_averaged_while_they_change(
+    sequence: PictureSequence, roughness: float, age: float
+) -> None:
+    """Once nothing changes, they are, as all else."""
+    materials = tuple(replace(material, roughness=roughness) for material in box_room().materials)
+    room = replace(box_room(), materials=materials)
+    for _ in range(12):
+        rested = sequence.picture(room, constant(1.0), follows_eye=True)
+    assert np.median(rested.age[rested.shown]) == 12.0
+    for index in range(9):
+        changing = sequence.picture(room, constant(1.0), follows_eye=True, scene_key=str(index))
+    assert np.median(changing.age[changing.shown]) == pytest.approx(age, abs=1e-4)
+
+
 def test_an_owner_that_missed_a_move_begins_anew(sequence: PictureSequence) -> None:
     """Motion leads to the picture before, not to the one that the owner saw last. Pictures in which nothing moved may
     be missed."""

@@ -43,6 +43,8 @@ MOST_MAGNIFIED = 2.0
 """How much larger a history may be shown than it was seen."""
 LEAST_VIEW_COSINE = 0.97
 """Of the angle, 14 degrees, between directions in which two pictures see a place alike."""
+MIRROR, ROUGH = 0.05, 0.3
+"""Roughness of reflections without noise, which averaging only blurs while they change, and of those that need it."""
 SAME_EYE = 1e-9
 """Relative difference of the matrices of a camera that rests: float64 rounding of jitter."""
 
@@ -130,6 +132,8 @@ class Accumulator:
             "LONGEST_WAY": LONGEST_WAY,
             "MOST_MAGNIFIED": MOST_MAGNIFIED,
             "LEAST_VIEW_COSINE": LEAST_VIEW_COSINE,
+            "MIRROR": MIRROR,
+            "ROUGH": ROUGH,
         }
 
     @property
@@ -165,7 +169,7 @@ class Accumulator:
             history.seen = None
         is_settled = self._note_changes(view, space, scene_key, motion)
         self._reproject(gbuffer, view, space, motion, LARGEST if is_settled else self._settings.changing_history)
-        self._blend(gbuffer, view, found, 0.0 if is_settled else self._settings.clamp, sample_index)
+        self._blend(gbuffer, view, found, is_settled, sample_index)
         history.seen = view, space
         history.key, history.scene_key = key, scene_key
         history.picture = motion.scene.picture if motion is not None else 0
@@ -220,7 +224,7 @@ class Accumulator:
         self._context.memory_barrier()
 
     def _blend(
-        self, gbuffer: GBuffer, view: View, found: moderngl.Texture, clamp_width: float, sample_index: int
+        self, gbuffer: GBuffer, view: View, found: moderngl.Texture, is_settled: bool, sample_index: int
     ) -> None:
         """Fills the result and the history."""
         history = self._history
@@ -230,11 +234,13 @@ class Accumulator:
             texture.use(unit)
         for unit, texture in enumerate((history.irradiance, history.place, history.normal, self._result)):
             texture.bind_to_image(unit, read=False, write=True)
+        settings = self._settings
         uniforms = {
-            "most_age": self._settings.history,
-            "clamp_width": clamp_width,
+            "most_age": settings.history,
+            "clamp_width": 0.0 if is_settled else settings.clamp,
+            "mirror_age": settings.changing_history if self._follows_eye and not is_settled else -1.0,
             "pictures_of_frame": 1.0 + sample_index,
-            "cut_share": self._settings.cut_share,
+            "cut_share": settings.cut_share,
             **_pixel_sizes(view, gbuffer),
         }
         set_uniforms(shader, uniforms)
