@@ -71,9 +71,9 @@ def lobe_points(roughness: float, cos_view: float, per_side: int = POINTS_PER_SI
     u, v = (grid.ravel() for grid in np.meshgrid(*[(np.arange(per_side) + 0.5) / per_side] * 2, indexing="ij"))
     radius, turn = np.sqrt(u), 2.0 * np.pi * v
     disk = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1.0 - u)], axis=1)
-    directions = np.concatenate([_mirrored(disk, cos_view, alpha), disk])
+    directions = np.concatenate([mirrored(disk, cos_view, alpha), disk])
     directions = directions[directions[:, 2] > 0.0]
-    density = 0.5 * _mirrored_density(directions, cos_view, alpha) + 0.5 * directions[:, 2] / np.pi
+    density = 0.5 * mirrored_density(directions, cos_view, alpha) + 0.5 * directions[:, 2] / np.pi
     solid_angles = 1.0 / (density * 2.0 * per_side * per_side)
     return LobePoints(cos_view, alpha, directions, ggx_lobe(directions, cos_view, alpha), solid_angles)
 
@@ -82,7 +82,7 @@ def _eye(cos_view: float) -> Float64:
     return np.array([np.sqrt(max(1.0 - cos_view * cos_view, 0.0)), 0.0, cos_view])
 
 
-def _mirrored(disk: Float64, cos_view: float, alpha: float) -> Float64:
+def mirrored(disk: Float64, cos_view: float, alpha: float) -> Float64:
     """(n, 3) the eye mirrored at visible normals (Heitz 2018), one for each point of the unit hemisphere `disk`."""
     eye = _eye(cos_view)
     stretched = eye * [alpha, alpha, 1.0]
@@ -98,8 +98,8 @@ def _mirrored(disk: Float64, cos_view: float, alpha: float) -> Float64:
     return np.asarray(2.0 * (half @ eye)[:, None] * half - eye)
 
 
-def _mirrored_density(directions: Float64, cos_view: float, alpha: float) -> Float64:
-    """(n,) of `_mirrored`, 1/sr."""
+def mirrored_density(directions: Float64, cos_view: float, alpha: float) -> Float64:
+    """(n,) of `mirrored`, 1/sr."""
     half = directions + _eye(cos_view)
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     squared = alpha * alpha

@@ -10,6 +10,8 @@
 #include "lib/brdf.glsl"
 #include "lib/form_factor.glsl"
 
+// Squared sizes in the lobe's space up to which a few points of a light stand for it, and from which on they do not.
+#define LTC_POINT_SIZES vec2(0.1, 0.6)
 // Most by which the true lobe is taken to exceed the fitted one.
 #define LTC_MOST_RATIO 3.0
 
@@ -21,7 +23,7 @@ struct LtcLobe {
 };
 
 // What polygons fill of a lobe. share: cosine-weighted, in [0, 1]. toward: in the lobe's space to their middle as the
-// lobe sees it, and as long as their solid angle there, times 2, where that is small.
+// lobe sees it; its length is twice their solid angle there while that is small.
 struct LobeShare {
     float share;
     vec3 toward;
@@ -135,9 +137,8 @@ LobeShare triangle_lobe_share(LtcLobe lobe, vec3 a, vec3 b, vec3 c, vec3 area_ve
     return LobeShare(share, toward);
 }
 
-// The same of a light of which a part may be below the surface: clipped there first. p, v0, v1, v2: m; n: unit.
-LobeShare clipped_lobe_share(LtcLobe lobe, vec3 p, vec3 n, vec3 v0, vec3 v1, vec3 v2, vec3 area_vector) {
-    vec3 a = v0 - p, b = v1 - p, c = v2 - p;
+// The same of a whole light of which a part may be below the surface with unit normal n: clipped there first.
+LobeShare clipped_lobe_share(LtcLobe lobe, vec3 n, vec3 a, vec3 b, vec3 c, vec3 area_vector) {
     vec3 heights = vec3(dot(n, a), dot(n, b), dot(n, c));
     float facing = -dot(area_vector, a);
     if (!(facing > 0.0) || max(max(heights.x, heights.y), heights.z) <= 0.0) {
@@ -157,18 +158,50 @@ LobeShare clipped_lobe_share(LtcLobe lobe, vec3 p, vec3 n, vec3 v0, vec3 v1, vec
     return sum;
 }
 
-// Radiance towards the eye of a lobe of which polygons of radiance 1 fill `found`. Fresnel is that of their middle as
-// the lobe sees it; where they are small, so is the lobe itself, and nothing is left of the fit's error.
-vec3 lobe_reflection(LtcLobe lobe, Reflector reflector, vec3 normal, vec3 to_view, LobeShare found) {
-    vec3 to_light = from_lobe(lobe, found.toward);
+// GGX times the cosine of the light and Fresnel, 1/sr, as specular_reflection, but with all digits for sharp lobes.
+// fresnel: lobe_fresnel's, with the gains of multiple scattering.
+float true_lobe(Reflector reflector, vec3 normal, vec3 to_view, vec3 to_light, out vec3 fresnel) {
     vec3 half_vector = to_light + to_view;
     half_vector *= inversesqrt(max(dot(half_vector, half_vector), 1e-30));
+    fresnel = lobe_fresnel(reflector, clamp(dot(to_view, half_vector), 0.0, 1.0));
     vec3 across = cross(normal, half_vector);
-    float cos_light = max(dot(normal, to_light), 0.0);
-    float lobe_there = ggx_lobe_of_sine(min(dot(across, across), 1.0), cos_light, dot(normal, to_view), reflector.alpha);
-    float ratio = min(lobe_there / max(fitted_lobe(lobe, to_light), 1e-30), LTC_MOST_RATIO);
+    float cos_light = max(dot(normal, to_light), 0.0), cos_view = max(dot(normal, to_view), 0.0);
+    return ggx_lobe_of_sine(min(dot(across, across), 1.0), cos_light, cos_view, reflector.alpha);
+}
+
+// Radiance towards the eye of a lobe of which polygons of radiance 1 fill `found`. Fresnel is that of their middle as
+// the lobe sees it; where they are small, so is the lobe, and less is left of the fit's error.
+vec3 lobe_reflection(LtcLobe lobe, Reflector reflector, vec3 normal, vec3 to_view, LobeShare found) {
+    vec3 to_light = from_lobe(lobe, found.toward), fresnel;
+    float there = true_lobe(reflector, normal, to_view, to_light, fresnel);
+    float ratio = min(there / max(fitted_lobe(lobe, to_light), 1e-30), LTC_MOST_RATIO);
     float spread = max(1.0 - length(found.toward) * INVERSE_PI, 0.0);
-    float scale = lobe.scale * found.share * mix(1.0, ratio, spread * spread);
-    return scale * lobe_fresnel(reflector, clamp(dot(to_view, half_vector), 0.0, 1.0));
+    return lobe.scale * found.share * mix(1.0, ratio, spread * spread) * fresnel;
+}
+
+// How much a few points of a light stand for it: 1 where it is so small that the lobe is smooth over it, 0 where it is
+// large or its centre next to the horizon. centre: from the point to its centroid. radius: of the light.
+float point_share(LtcLobe lobe, vec3 normal, vec3 centre, float radius) {
+    vec3 mapped = to_lobe(lobe, centre);
+    float stretched = radius * max(lobe.inverse_widths.x, lobe.inverse_widths.y);
+    float size = stretched * stretched / max(dot(mapped, mapped), 1e-37);
+    float above = clamp(dot(normal, centre) / max(radius, 1e-37), 0.0, 1.0);
+    return above * (1.0 - smoothstep(LTC_POINT_SIZES.x, LTC_POINT_SIZES.y, size));
+}
+
+// Radiance towards the eye of a point of a light of radiance 1, as if all of its area were there.
+vec3 point_reflection(Reflector reflector, vec3 normal, vec3 to_view, vec3 to_point, vec3 area_vector) {
+    float inverse = inversesqrt(max(dot(to_point, to_point), 1e-37));
+    vec3 to_light = to_point * inverse, fresnel;
+    float solid_angle = max(-dot(area_vector, to_light) * inverse * inverse, 0.0);
+    return solid_angle * true_lobe(reflector, normal, to_view, to_light, fresnel) * fresnel;
+}
+
+// The mean over three points, exact for quadratic functions. a, b, c: from the point to the corners.
+vec3 points_reflection(Reflector reflector, vec3 normal, vec3 to_view, vec3 a, vec3 b, vec3 c, vec3 area_vector) {
+    vec3 sixth = (a + b + c) * (1.0 / 6.0);
+    return (point_reflection(reflector, normal, to_view, sixth + 0.5 * a, area_vector)
+        + point_reflection(reflector, normal, to_view, sixth + 0.5 * b, area_vector)
+        + point_reflection(reflector, normal, to_view, sixth + 0.5 * c, area_vector)) * (1.0 / 3.0);
 }
 #endif

@@ -60,7 +60,8 @@ void classify(PointGroup group, uint first, uint end) {
     barrier();
 }
 
-// A tagged light leaves out the surfaces of its own tag (seed 002, 3.4).
+// A tagged light leaves out the surfaces of its own tag (seed 002, 3.4). The loop that runs once at most is a branch
+// that software renderers skip where no pixel takes it.
 #define ADD_MEMBERS(MEMBERS, LOBE_SHARE) \
     for (int word = 0; word < WORDS; ++word) { \
         uint bits = MEMBERS[word]; \
@@ -68,12 +69,17 @@ void classify(PointGroup group, uint first, uint end) {
             uint i = first + uint(32 * word + findLSB(bits)); \
             bits &= bits - 1u; \
             VirtualLight light = lights[i]; \
-            LobeShare found = LOBE_SHARE; \
+            vec3 a = light.v0 - position, b = light.v1 - position, c = light.v2 - position; \
             bool is_own = light.tag_id != UNTAGGED && light.tag_id == surface.tag_id; \
-            if (found.share > 0.0 && !is_own) { \
-                vec3 radiance = radiosities[i].rgb * INVERSE_PI; \
-                sum += radiance * lobe_reflection(lobe, reflector, normal, to_view, found); \
+            vec3 radiance = is_own ? vec3(0.0) : radiosities[i].rgb * INVERSE_PI; \
+            float as_points = point_share(lobe, normal, (a + b + c) * (1.0 / 3.0), light.bounding_radius); \
+            vec3 seen = points_reflection(reflector, normal, to_view, a, b, c, light.area_vector); \
+            for (bool is_large = as_points < 1.0; is_large; is_large = false) { \
+                LobeShare found = LOBE_SHARE; \
+                vec3 as_polygon = lobe_reflection(lobe, reflector, normal, to_view, found); \
+                seen = mix(as_polygon, seen, as_points); \
             } \
+            sum += radiance * seen; \
         } \
     }
 
@@ -86,11 +92,8 @@ vec3 batch_reflection(Surface surface, uint first) {
     vec4 fit = lookup_ltc(ltc_table, reflector.alpha, cos_view);
     LtcLobe lobe = make_ltc_lobe(fit, reflector.alpha, albedo, normal, to_view);
     vec3 sum = vec3(0.0);
-    ADD_MEMBERS(whole, triangle_lobe_share(
-        lobe, light.v0 - position, light.v1 - position, light.v2 - position, light.area_vector,
-        dot(light.area_vector, position - light.v0)))
-    ADD_MEMBERS(clipped, clipped_lobe_share(
-        lobe, position, normal, light.v0, light.v1, light.v2, light.area_vector))
+    ADD_MEMBERS(whole, triangle_lobe_share(lobe, a, b, c, light.area_vector, -dot(light.area_vector, a)))
+    ADD_MEMBERS(clipped, clipped_lobe_share(lobe, normal, a, b, c, light.area_vector))
     return sum;
 }
 
