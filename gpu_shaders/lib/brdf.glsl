@@ -71,6 +71,10 @@ vec4 lookup_albedo(sampler3D albedo_table, float f0, float cos_view, float rough
 
 // How `surface` reflects towards the unit direction to_view. albedo_table: core/brdf.py's, filtered linearly.
 Reflector make_reflector(Surface surface, vec3 to_view, sampler3D albedo_table) {
+#ifdef ALL_DIFFUSE
+    // Software renderers would look the table up for every pixel.
+    return Reflector(surface.base_color, vec3(0.0), vec3(0.0), 0.0, 1.0, 0.0);
+#else
     if (surface.model != MODEL_PRINCIPLED) {
         return Reflector(surface.base_color, vec3(0.0), vec3(0.0), 0.0, 1.0, 0.0);
     }
@@ -87,6 +91,7 @@ Reflector make_reflector(Surface surface, vec3 to_view, sampler3D albedo_table) 
         surface.base_color * (dielectric * max(1.0 - layer_albedo, 0.0)), metal_f0, surface.metallic * metal_gain,
         dielectric * gain, ior, max(surface.roughness * surface.roughness, LEAST_ALPHA)
     );
+#endif
 }
 
 // Roughness squared of a lobe that a light of some solid angle (sr) blurs as much as its half vectors spread. 0 stays 0.

@@ -15,12 +15,16 @@ float piece_solid_angle(vec2 place, vec2 size) {
 
 // Share of the irradiance that `surface` sends out diffusely, averaged over views; core/brdf.py, diffuse_reflectance.
 vec3 diffuse_reflectance(Surface surface, sampler3D albedo_table) {
+#ifdef ALL_DIFFUSE
+    return surface.base_color;
+#else
     if (surface.model != MODEL_PRINCIPLED) {
         return surface.base_color;
     }
     float f0 = f0_from_ior(specular_ior(surface.ior, surface.specular_ior_level));
     float layer_albedo = lookup_albedo(albedo_table, f0, 1.0, surface.roughness).w;
     return surface.base_color * ((1.0 - surface.metallic) * max(1.0 - layer_albedo, 0.0));
+#endif
 }
 
 // Where p projects into a map of one tile, in [0, 1]²: the nearest place in the map where it lies beside it.

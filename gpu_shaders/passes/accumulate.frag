@@ -17,8 +17,10 @@ uniform vec3 background_up;
 layout(location = 0) out vec4 out_combined;
 layout(location = 1) out vec4 out_direct;       // w: share of the pixel that shows geometry
 layout(location = 2) out vec4 out_indirect;
+#ifdef EVERY_OUTPUT
 layout(location = 3) out vec4 out_irradiance;
 layout(location = 4) out vec4 out_specular;
+#endif
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -29,7 +31,10 @@ void main() {
         background += textureLod(environment_map, environment_place(ray), 0.0).rgb;
 #endif
         out_combined = weight * vec4(background, 1.0);
-        out_direct = out_indirect = out_irradiance = out_specular = vec4(0.0);
+        out_direct = out_indirect = vec4(0.0);
+#ifdef EVERY_OUTPUT
+        out_irradiance = out_specular = vec4(0.0);
+#endif
         return;
     }
     Surface surface = fetch_surface(pixel);
@@ -39,6 +44,8 @@ void main() {
     out_combined = weight * vec4(surface.emission + direct + indirect + specular, 1.0);
     out_direct = weight * vec4(direct, 1.0);
     out_indirect = weight * vec4(indirect, 1.0);
+#ifdef EVERY_OUTPUT
     out_irradiance = weight * vec4(received(pixel), 1.0);
     out_specular = weight * vec4(specular, 1.0);
+#endif
 }

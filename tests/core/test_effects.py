@@ -49,6 +49,7 @@ FACTS = SceneFacts(
     is_lit_by_world=True,
     glowing=("neon",),
     glossy=("chrome",),
+    layered=("chrome",),
     tagged_surface=True,
     light_mesh=LightMeshFacts(lights=44, reflecting=40, glowing=2, tagged=3),
     occlusion=BLOCKED,
@@ -70,6 +71,7 @@ CALLED_FOR = {
     "world_lights": (FACTS, "the world sends light"),
     "direct_light": (FACTS, "'Key', 'Fill' shine on what the picture shows"),
     "shadows": (FACTS, "'Box'"),
+    "layered_materials": (FACTS, "'chrome' has layers"),
     "direct_specular": (FACTS, "'chrome' has a specular layer, on 25 % of the picture"),
     "indirect_light": (FACTS, "2 of 44 virtual lights shine by themselves"),
     "light_tags": (FACTS, "3 virtual lights have a tag"),
@@ -94,6 +96,7 @@ NOT_CALLED_FOR = [
     ("direct_light", {"screen": replace(SCREEN, shown=0)}, "none of 1,000 pixels"),
     ("shadows", {"lamp_occlusion": OPEN}, "12 triangles"),
     ("shadows", DARK, "nothing shines"),
+    ("layered_materials", {"layered": ()}, "every material is Diffuse"),
     ("direct_specular", {"glossy": ()}, "no material"),
     ("direct_specular", {"screen": replace(SCREEN, glossy=0)}, "none of 1,000 pixels"),
     ("direct_specular", {"lamps": NO_LAMPS, "is_lit_by_world": False}, "no direct light"),
@@ -188,12 +191,14 @@ def test_what_is_impossible_does_not_run_for_anybody() -> None:
     assert "has no polygons" in decision.reason
 
 
-def test_without_economy_what_is_neutral_runs_and_what_is_not_wanted_does_not() -> None:
+def test_without_economy_what_is_neutral_runs_and_what_is_not_wanted_idles() -> None:
     dull = replace(FACTS, glossy=(), lamp_occlusion=OPEN, occlusion=OPEN)
     plan = plan_effects(dull, economical=False)
     assert all(plan.runs(name) for name in ("shadows", "direct_specular", "screen_reflection"))
-    assert not plan.runs("ambient_occlusion")
-    assert not plan.runs("map_reflection")
+    for name in ("ambient_occlusion", "map_reflection"):
+        assert plan.computes(name)
+        assert not plan.runs(name)
+    assert plan["light_visibility"].action == SKIP
     assert not plan_effects(dull, {"shadows": OFF}, economical=False).runs("shadows")
 
 

@@ -51,11 +51,13 @@ def technique_group(scene: Any, technique: str) -> Any:
 
 def shown_settings(group: Any, settings_type: type) -> list[str]:
     """Names of the settings in `group` that count with the others as they are."""
-    return [
-        info.name
-        for info in describe(settings_type)
-        if info.only_with is None or getattr(group, info.only_with[0]) == info.only_with[1]
-    ]
+    infos = {info.name: info for info in describe(settings_type)}
+
+    def counts(name: str) -> bool:
+        control = infos[name].only_with
+        return control is None or (getattr(group, control[0]) == control[1] and counts(control[0]))
+
+    return [name for name in infos if counts(name)]
 
 
 def effect_values(scene: Any) -> dict[str, Any]:

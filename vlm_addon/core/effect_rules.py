@@ -115,6 +115,12 @@ def _glossy(facts: SceneFacts) -> Verdict:
     return Verdict(CALLED_FOR, f"{names} a specular layer, on {share:.3g} % of the picture")
 
 
+def _layered_materials(facts: SceneFacts, before: Before) -> Verdict:
+    if not facts.layered:
+        return Verdict(NEUTRAL, "every material is Diffuse")
+    return Verdict(CALLED_FOR, f"{_listed(facts.layered, 'have')} layers that share the light")
+
+
 def _direct_specular(facts: SceneFacts, before: Before) -> Verdict:
     if "direct_light" not in before.running:
         return Verdict(NEUTRAL, "there is no direct light")
@@ -128,7 +134,8 @@ def _indirect_light(facts: SceneFacts, before: Before) -> Verdict:
     nothing = _shows_nothing(facts) or _is_dark(facts)
     if nothing is not None:
         return nothing
-    if facts.technique.has_reflecting_lights and facts.light_mesh is not None:
+    of_lights_alone = facts.technique.has_reflecting_lights and not facts.technique.bounces_without_lights
+    if of_lights_alone and facts.light_mesh is not None:
         return _light_of_light_mesh(facts)
     return Verdict(CALLED_FOR, f"technique {name!r} finds what surfaces reflect of it")
 
@@ -225,6 +232,13 @@ def _temporal_accumulation(facts: SceneFacts, before: Before) -> Verdict:
 
 
 RULES = (
+    Rule(
+        "layered_materials",
+        "Layered materials",
+        "auto",
+        "Layers of Principled materials, in all passes that reflect light",
+        _layered_materials,
+    ),
     Rule("world_lights", "World lights", "auto", "The world's light as suns with shadows", _world_lights),
     Rule("direct_light", "Direct light", "auto", "Light straight from lamps and world, a pass for each", _direct_light),
     Rule("shadows", "Shadows", "auto", "Maps of what lamps see, for direct light and phase one", _shadows),

@@ -16,12 +16,13 @@ from .scene_facts import SceneFacts
 
 AUTO, ON, OFF = "auto", "on", "off"
 CHOICES = (AUTO, ON, OFF)
-RUN, REUSE, SKIP = "run", "reuse", "skip"
+RUN, REUSE, SKIP, IDLE = "run", "reuse", "skip", "idle"
 
 
 @dataclass(frozen=True)
 class Decision:
-    """Of one effect or structure. action: RUN, REUSE (what an earlier frame made) or SKIP. is_forced: by the artist,
+    """Of one effect or structure. action: RUN, REUSE (what an earlier frame made), SKIP, or IDLE: it runs, but what it
+    finds is not wanted (only where nothing is to be left out). is_forced: by the artist,
     not by what the scene calls for."""
 
     name: str
@@ -49,10 +50,14 @@ class EffectPlan:
         """Whether the effect of that name runs."""
         return self[name].action == RUN
 
+    def computes(self, name: str) -> bool:
+        """Whether its passes run, though maybe for nothing."""
+        return self[name].action in (RUN, IDLE)
+
     def merged(self, other: EffectPlan) -> EffectPlan:
         """Of two pictures of a frame: an effect runs where it runs in one of them."""
         pairs = zip(self.effects, other.effects, strict=True)
-        return replace(self, effects=tuple(b if a.action == SKIP and b.action == RUN else a for a, b in pairs))
+        return replace(self, effects=tuple(b if a.action != RUN and b.action == RUN else a for a, b in pairs))
 
 
 def plan_from_tree(tree: Mapping[str, Any]) -> EffectPlan:
@@ -63,8 +68,8 @@ def plan_from_tree(tree: Mapping[str, Any]) -> EffectPlan:
 def plan_effects(facts: SceneFacts, choices: Mapping[str, str] | None = None, *, economical: bool = True) -> EffectPlan:
     """What a scene calls for.
 
-    choices: AUTO, ON or OFF by name of effect; its own default where not named. economical: leave out what is neutral;
-    otherwise everything enabled runs. Raises InvalidInput for an unknown effect or choice.
+    choices: AUTO, ON or OFF by name of effect; its own default where not named. economical: leave out what is neutral
+    or not wanted; otherwise everything enabled runs. Raises InvalidInput for an unknown effect or choice.
     """
     choices = {} if choices is None else choices
     for name, choice in choices.items():
@@ -100,8 +105,9 @@ def _decided(rule: Rule, verdict: Verdict, choice: str, economical: bool) -> Dec
         return decision(RUN, f"switched on: {verdict.reason}", True)
     if is_needed:
         return decision(RUN, verdict.reason)
-    if verdict.kind == NEUTRAL and not economical:
-        return decision(RUN, f"nothing is left out, though {verdict.reason}", True)
+    if not economical:
+        action = RUN if verdict.kind == NEUTRAL else IDLE
+        return decision(action, f"nothing is left out, though {verdict.reason}", True)
     return decision(SKIP, verdict.reason)
 
 

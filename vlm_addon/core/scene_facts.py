@@ -12,7 +12,7 @@ from .lamps import lamp_hull
 from .light_mesh import VirtualLightMesh
 from .occluders import Occlusion
 from .reach import box_corners, in_reach
-from .scene import SUN, UNTAGGED, Float64, Light, Material, SceneSnapshot
+from .scene import PRINCIPLED, SUN, UNTAGGED, Float64, Light, Material, SceneSnapshot
 from .world_light import is_lit_by_world
 
 NO_SPECULAR, OWN_SPECULAR, SPECULAR_BY_EFFECTS = "none", "own", "effects"
@@ -25,7 +25,8 @@ class TechniqueFacts:
     has_indirect: whether there is indirect light in its picture. knows_visibility: whether that light is occluded where
     something stands in its way. asks_visibility: whether its settings ask for what the plan may leave out for that.
     specular: whether it has indirect light in glossy surfaces: none, its own, or what effects add.
-    has_reflecting_lights: whether its lights are polygons that show in glossy surfaces.
+    has_reflecting_lights: whether it has virtual lights, which are polygons that show in glossy surfaces;
+    bounces_without_lights: whether it finds other light beside theirs.
     """
 
     name: str
@@ -34,6 +35,7 @@ class TechniqueFacts:
     asks_visibility: bool = False
     specular: str = SPECULAR_BY_EFFECTS
     has_reflecting_lights: bool = False
+    bounces_without_lights: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,9 @@ class LampFacts:
 class SceneFacts:
     """What decides; names are those of the snapshot.
 
-    glossy, glowing: names of materials that some triangle has and that have a specular layer, or shine. tagged_surface:
-    whether a triangle has a tag. occlusion: of light between surfaces; lamp_occlusion: of that from lamps, too. screen:
-    None before there is a picture. samples: pictures of the frame.
+    glossy, glowing, layered: names of materials that some triangle has and that have a specular layer, shine, or are
+    Principled. tagged_surface: whether a triangle has a tag. occlusion: of light between surfaces; lamp_occlusion: of
+    that from lamps, too. screen: None before there is a picture. samples: pictures of the frame.
     """
 
     scene: str
@@ -84,6 +86,7 @@ class SceneFacts:
     is_lit_by_world: bool
     glowing: tuple[str, ...]
     glossy: tuple[str, ...]
+    layered: tuple[str, ...]
     tagged_surface: bool
     light_mesh: LightMeshFacts | None
     occlusion: Occlusion
@@ -115,6 +118,7 @@ def gather_facts(
         lamps=lamp_facts(snapshot),
         is_lit_by_world=is_lit_by_world(snapshot),
         glowing=tuple(material.name for material in used if max(material.emission) > 0.0),
+        layered=tuple(material.name for material in used if material.model == PRINCIPLED),
         glossy=tuple(material.name for material in used if material.has_specular_layer),
         tagged_surface=any((mesh.tag_ids != UNTAGGED).any() for mesh in snapshot.meshes),
         light_mesh=None if light_mesh is None else _light_mesh_facts(light_mesh),

@@ -45,10 +45,14 @@ class Device:
         self.name: str = self.context.info["GL_RENDERER"]
         self.is_software = any(word in self.name.lower() for word in SOFTWARE_RENDERERS)
         self.shaders = ShaderLibrary(self.context)
-        self.kept = Kept()
-        self.light_structures = LightStructures(self.kept, on_device=not self.is_software)
+        self.forget()
         # moderngl never deletes a query, so frames share them.
         self._queries: list[Any] = []
+
+    def forget(self) -> None:
+        """Lets go of all that was kept over frames: the next frame is as that of a device that has seen nothing."""
+        self.kept = Kept()
+        self.light_structures = LightStructures(self.kept, on_device=not self.is_software)
 
     def __enter__(self) -> Device:
         return self

@@ -86,6 +86,7 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
             stage.kept, snapshot, light_mesh, (*world, *direct_world), technique_type.facts(chosen), settings
         )
     plan = planner.plan
+    shaders = shaders.with_common(_plan_defines(plan))
     if not plan.runs("world_lights"):
         world = direct_world = ()
     lit = replace(snapshot, lights=(*snapshot.lights, *world))
@@ -120,7 +121,14 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
     technique = technique_type(scene, chosen) if plan.runs("indirect_light") and not settings.plan_only else None
     direct_light = DirectLightPass(context, shaders, settings.width, settings.height)
     gbuffer_pass = GBufferPass(context, shaders, settings.width, settings.height)
-    accumulate = AccumulatePass(context, shaders, settings.width, settings.height, snapshot.environment)
+    accumulate = AccumulatePass(
+        context,
+        shaders,
+        settings.width,
+        settings.height,
+        snapshot.environment,
+        every_output=settings.buffers,
+    )
     effects = FrameEffects(scene, technique, chosen_effects, lamps)
     shares = picture_shares(direct_shadows.lights, settings.samples)
     census = ScreenCensusPass(context, shaders)
@@ -170,8 +178,6 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
         images["coverage"] = np.ascontiguousarray(sums["direct"][..., 3:])
         images |= surface_images(gbuffer_pass, geometry, camera, settings, space)
         images |= effects.images() | ({} if technique is None else technique.images())
-    else:
-        del images["irradiance"], images["specular"]
     if settings.display:
         with timer.measure("tone mapping"):
             images["display"] = display_image(device, images["combined"])
@@ -194,8 +200,9 @@ def _plan_alone(device: Device, planner: FramePlanner, stage: _Stage, timer: Pas
 
 
 def _whole_plan(planner: FramePlanner, stage: _Stage) -> EffectPlan:
-    """With what was used again."""
-    events = {kind: (reuse.built, reuse.reused) for kind, reuse in stage.kept.events().items()}
+    """With what was used again; parts of a thing are told with it."""
+    told = stage.kept.events()
+    events = {kind: (reuse.built, reuse.reused) for kind, reuse in told.items() if kind.rpartition(" ")[0] not in told}
     return replace(planner.plan, structures=structure_decisions(events))
 
 
@@ -223,6 +230,12 @@ def _world_lights(stage: _Stage, snapshot: SceneSnapshot) -> tuple[tuple[Light, 
     lights = kept_lights("world_lights", settings.world_lights)
     direct_count = direct_world_lights(settings.world_lights, settings.samples)
     return lights, kept_lights("direct_world_lights", direct_count)
+
+
+def _plan_defines(plan: EffectPlan) -> dict[str, int | float | bool | str]:
+    """Of all shaders of a frame: what is not called for is not in them."""
+    absent = {"ALL_DIFFUSE": "layered_materials", "NO_TAGS": "light_tags"}
+    return {name: True for name, effect in absent.items() if not plan.runs(effect)}
 
 
 def _casting(lights: Sequence[Light], plan: EffectPlan) -> tuple[Light, ...]:

@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..core.effects import EffectPlan, parse_choices
 from ..core.errors import InvalidInput
 from ..core.scene import Float32
 from ..core.settings import checked_values
+from .effect_history import EffectHistory
 from .frame_types import RenderSettings
 from .map_settings import MapSettings
 from .passes.accumulate import PictureLight, read_image
@@ -21,6 +24,7 @@ from .passes.map_reflection import MapReflectionPass, MapReflectionSettings
 from .passes.reflected_light import LitPicturePass, SpecularMixPass
 from .passes.rsm import LampReflections
 from .passes.screen_reflection import ReflectionSettings, ScreenReflectionPass
+from .passes.temporal_accumulation import AccumulationSettings
 from .technique import FrameInputs, SceneInputs, Technique
 
 if TYPE_CHECKING:
@@ -31,6 +35,7 @@ SETTINGS: Mapping[str, type] = MappingProxyType(
         "ambient_occlusion": OcclusionSettings,
         "screen_reflection": ReflectionSettings,
         "map_reflection": MapReflectionSettings,
+        "temporal_accumulation": AccumulationSettings,
     }
 )
 """Of effects that have any."""
@@ -63,48 +68,72 @@ class FrameEffects:
         self._passes: dict[str, Any] = {}
         self._maps: LampReflections | None = None
         self._shown: dict[str, moderngl.Texture] = {}
+        self._history: EffectHistory | None = None
 
     def openness(self, plan: EffectPlan, frame: FrameInputs) -> moderngl.Texture | None:
         """Share of indirect light that is not occluded, in r; None for all of it."""
-        if not plan.runs("ambient_occlusion"):
+        if not plan.computes("ambient_occlusion"):
             return None
         settings: OcclusionSettings = self._settings["ambient_occlusion"]
         chosen = self._pass("ambient_occlusion", AmbientOcclusionPass, settings)
         maps = None if self._technique is None else self._technique.lamp_maps()
-        with self._scene.timer.measure("ambient occlusion"):
-            found: moderngl.Texture = chosen.render(
-                frame.gbuffer,
-                frame.view,
-                frame.sample_index,
-                maps.maps() if maps is not None else (),
-                self._scene.space,
-            )
-        self._shown["ambient_occlusion"] = found
+
+        def find(index: int) -> moderngl.Texture:
+            with self._scene.timer.measure("ambient occlusion"):
+                views = maps.maps() if maps is not None else ()
+                found: moderngl.Texture = chosen.render(frame.gbuffer, frame.view, index, views, self._scene.space)
+            return found
+
+        found = self._found("ambient_occlusion", plan, frame, find, follows_eye=False)
+        return found if plan.runs("ambient_occlusion") else None
+
+    def _found(
+        self,
+        name: str,
+        plan: EffectPlan,
+        frame: FrameInputs,
+        find: Callable[[int], moderngl.Texture],
+        *,
+        follows_eye: bool,
+    ) -> moderngl.Texture:
+        """What `find` makes of the number of a picture, with what was found before where the plan says so."""
+        if plan.runs("temporal_accumulation"):
+            if self._history is None:
+                self._history = EffectHistory(self._scene, self._settings["temporal_accumulation"])
+            found = find(self._history.picture(name, follows_eye=follows_eye))
+            found = self._history.mean(name, frame, found, self._scene.kept.digests.of(self._settings[name]))
+        else:
+            found = find(frame.sample_index)
+        self._shown[name] = found
         return found
 
     def specular(self, plan: EffectPlan, frame: FrameInputs, light: PictureLight) -> moderngl.Texture | None:
         """Radiance of indirect light in glossy surfaces, rgb; None for none."""
         own = None if self._technique is None else self._technique.specular()
-        if not any(plan.runs(name) for name in REFLECTIONS):
+        if not any(plan.computes(name) for name in REFLECTIONS):
             return own
         found: dict[str, moderngl.Texture | None] = dict.fromkeys(REFLECTIONS)
-        if plan.runs("screen_reflection"):
-            found["screen_reflection"] = self._screen_reflection(frame, light)
-        if plan.runs("map_reflection"):
-            found["map_reflection"] = self._map_reflection(frame, found["screen_reflection"])
-        if plan.runs("light_mesh_reflection"):
+        if plan.computes("screen_reflection"):
+            found["screen_reflection"] = self._screen_reflection(plan, frame, light)
+        if plan.computes("map_reflection"):
+            found["map_reflection"] = self._map_reflection(plan, frame, found["screen_reflection"])
+        if plan.computes("light_mesh_reflection"):
             found["light_mesh_reflection"] = self._light_mesh_reflection(frame)
-        self._shown |= {name: texture for name, texture in found.items() if texture is not None}
+        wanted = (texture if plan.runs(name) else None for name, texture in found.items())
         with self._scene.timer.measure("mix reflections"):
-            mix: moderngl.Texture = self._pass("mix", SpecularMixPass).render(own, *found.values())
+            mix: moderngl.Texture = self._pass("mix", SpecularMixPass).render(own, *wanted)
         return mix
 
-    def _screen_reflection(self, frame: FrameInputs, light: PictureLight) -> moderngl.Texture:
-        with self._scene.timer.measure("screen reflection"):
-            lit = self._pass("lit", LitPicturePass).render(frame.gbuffer, frame.view, light)
-            chosen = self._pass("screen_reflection", ScreenReflectionPass, self._settings["screen_reflection"])
-            found: moderngl.Texture = chosen.render(frame.gbuffer, frame.view, lit, frame.sample_index)
-        return found
+    def _screen_reflection(self, plan: EffectPlan, frame: FrameInputs, light: PictureLight) -> moderngl.Texture:
+        chosen = self._pass("screen_reflection", ScreenReflectionPass, self._settings["screen_reflection"])
+
+        def find(index: int) -> moderngl.Texture:
+            with self._scene.timer.measure("screen reflection"):
+                lit = self._pass("lit", LitPicturePass).render(frame.gbuffer, frame.view, light)
+                found: moderngl.Texture = chosen.render(frame.gbuffer, frame.view, lit, index)
+            return found
+
+        return self._found("screen_reflection", plan, frame, find, follows_eye=True)
 
     def _light_mesh_reflection(self, frame: FrameInputs) -> moderngl.Texture | None:
         lights = None if self._technique is None else self._technique.reflecting_lights()
@@ -114,21 +143,21 @@ class FrameEffects:
             found: moderngl.Texture = self._pass("light_mesh_reflection", LightMeshReflectionPass).render(
                 frame.gbuffer, frame.view, *lights, frame.progress
             )
+        self._shown["light_mesh_reflection"] = found
         return found
 
-    def _map_reflection(self, frame: FrameInputs, known: moderngl.Texture | None) -> moderngl.Texture:
-        maps = self._lamp_maps()
-        with self._scene.timer.measure("map reflection"):
-            found: moderngl.Texture = self._pass("map_reflection", MapReflectionPass).render(
-                frame.gbuffer,
-                frame.view,
-                maps.maps(),
-                self._scene.space,
-                self._settings["map_reflection"],
-                frame.sample_index,
-                known,
-            )
-        return found
+    def _map_reflection(self, plan: EffectPlan, frame: FrameInputs, known: moderngl.Texture | None) -> moderngl.Texture:
+        maps, settings = self._lamp_maps(), self._settings["map_reflection"]
+        chosen = self._pass("map_reflection", MapReflectionPass)
+
+        def find(index: int) -> moderngl.Texture:
+            with self._scene.timer.measure("map reflection"):
+                found: moderngl.Texture = chosen.render(
+                    frame.gbuffer, frame.view, maps.maps(), self._scene.space, settings, index, known
+                )
+            return found
+
+        return self._found("map_reflection", plan, frame, find, follows_eye=True)
 
     def _lamp_maps(self) -> LampReflections:
         """Those of the technique, or drawn for effects: of lamps, not of the world."""
@@ -157,7 +186,8 @@ class FrameEffects:
 
     def images(self) -> dict[str, Float32]:
         """What effects found for the last picture, by their names."""
-        return {
-            name: read_image(texture)[..., : 1 if name == "ambient_occlusion" else 3]
+        found = {
+            name: np.ascontiguousarray(read_image(texture)[..., : 1 if name == "ambient_occlusion" else 3])
             for name, texture in self._shown.items()
         }
+        return found | ({} if self._history is None else self._history.images())

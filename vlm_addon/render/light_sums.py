@@ -77,7 +77,7 @@ class FullSum(LightSum):
         super().__init__(scene, lights, radiosity, baked)
         size = scene.settings.width, scene.settings.height
         seen = None if baked is None else baked.of_lights()
-        self._pass = PhaseTwoPass(scene.context, scene.shaders, *size, seen, has_tags=scene.plan.runs("light_tags"))
+        self._pass = PhaseTwoPass(scene.context, scene.shaders, *size, seen)
         self._pictures = 0
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
@@ -121,9 +121,7 @@ class ClusteredSum(LightSum):
             self.forest = scene.kept.several(FOREST, scene.kept.digests.of(found.key, scene.space), upload)
         size = scene.settings.width, scene.settings.height
         seen = None if baked is None else baked.of_trees(trees)
-        self._pass = ClusteredPhaseTwoPass(
-            scene.context, scene.shaders, *size, seen, has_tags=scene.plan.runs("light_tags")
-        )
+        self._pass = ClusteredPhaseTwoPass(scene.context, scene.shaders, *size, seen)
 
     def render(self, gbuffer: GBuffer, progress: Progress) -> moderngl.Texture:
         """Irradiance of each pixel in W/m², RGBA32F."""
@@ -164,9 +162,7 @@ class CellSum(LightSum):
         self._max_lights = settings.max_lights
         size = scene.settings.width, scene.settings.height
         seen = None if baked is None else baked.of_lights()
-        self._pass = RangePhaseTwoPass(
-            scene.context, scene.shaders, *size, seen, has_tags=scene.plan.runs("light_tags")
-        )
+        self._pass = RangePhaseTwoPass(scene.context, scene.shaders, *size, seen)
         assert scene.world_lights is not None
         with scene.timer.measure("light grid"):
             self._grids = scene.structures.range_grids(

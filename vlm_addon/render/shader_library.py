@@ -7,6 +7,7 @@ A shader file has no `#version` line (the library puts it) and may contain `#inc
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -43,9 +44,19 @@ class ShaderLibrary:
         self._root = root
         self._compute: dict[tuple, moderngl.ComputeShader] = {}
         self._programs: dict[tuple, moderngl.Program] = {}
+        self._words: dict[str, frozenset[str]] = {}
+        self._common: dict[str, int | float | bool | str] = {}
+
+    def with_common(self, defines: Defines) -> ShaderLibrary:
+        """The same library, whose shaders are compiled with `defines` where they name them; both share what was
+        compiled."""
+        other = copy.copy(self)
+        other._common = dict(defines)
+        return other
 
     def compute(self, path: str, defines: Defines | None = None) -> moderngl.ComputeShader:
         """The compute shader of file `path`. Raises ShaderError."""
+        defines = self._all_defines([path], defines)
         key = (path, _key(defines))
         if key not in self._compute:
             self._compute[key] = self.compute_from_text(f'#include "{path}"\n', path, defines)
@@ -58,6 +69,7 @@ class ShaderLibrary:
 
     def program(self, vertex: str, fragment: str | None, defines: Defines | None = None) -> moderngl.Program:
         """The program of a vertex and a fragment shader file; fragment None for depth only. Raises ShaderError."""
+        defines = self._all_defines([vertex, *([] if fragment is None else [fragment])], defines)
         key = (vertex, fragment, _key(defines))
         if key not in self._programs:
             vertex_source, vertex_files = self.expand(f'#include "{vertex}"\n', vertex, defines)
@@ -68,6 +80,17 @@ class ShaderLibrary:
                 [vertex_files, fragment_files],
             )
         return self._programs[key]
+
+    def _all_defines(self, paths: list[str], defines: Defines | None) -> Defines | None:
+        """`defines` with those of the common ones that one of the files, or what it includes, names."""
+        named = set().union(*(self._words_of(path) for path in paths)) if self._common else set()
+        return {**{name: value for name, value in self._common.items() if name in named}, **(defines or {})}
+
+    def _words_of(self, path: str) -> frozenset[str]:
+        if path not in self._words:
+            lines = self._expanded_lines(f'#include "{path}"', 0, [path], set())
+            self._words[path] = frozenset(re.findall(r"\w+", "\n".join(lines)))
+        return self._words[path]
 
     def expand(self, text: str, name: str, defines: Defines | None = None) -> tuple[str, list[str]]:
         """Complete GLSL source of `text`, and its files in the order of their line numbers' thousands."""

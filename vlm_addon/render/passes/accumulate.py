@@ -24,7 +24,9 @@ IRRADIANCE_UNIT = DIRECT_UNIT + 1
 ENVIRONMENT_UNIT = DIRECT_UNIT + 4
 SPECULAR_UNIT = DIRECT_UNIT + 5
 OPENNESS_UNIT = DIRECT_UNIT + 6
-OUTPUTS = ("combined", "direct", "indirect", "irradiance", "specular")
+OUTPUTS = ("combined", "direct", "indirect")
+MORE_OUTPUTS = ("irradiance", "specular")
+"""Where every intermediate image is wanted."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +68,17 @@ class AccumulatePass:
         width: int,
         height: int,
         environment: Environment | None = None,
+        *,
+        every_output: bool = True,
     ) -> None:
-        """environment: what shows where no surface does, on top of the same from everywhere."""
+        """environment: what shows where no surface does, on top of the same from everywhere. every_output: also
+        MORE_OUTPUTS."""
+        self._outputs = (*OUTPUTS, *MORE_OUTPUTS) if every_output else OUTPUTS
         self._environment = environment
         self._environment_map = None if environment is None else _environment_texture(context, environment)
         self._context = context
         self._shaders = shaders
-        self._sums = [context.texture((width, height), 4, dtype="f4") for _ in OUTPUTS]
+        self._sums = [context.texture((width, height), 4, dtype="f4") for _ in self._outputs]
         self._framebuffer = context.framebuffer(self._sums)
         self._framebuffer.clear()
         self._albedo = AlbedoTexture(context)
@@ -87,6 +93,8 @@ class AccumulatePass:
     ) -> None:
         """Adds one picture. weight: one over the sample count."""
         defines = light.bind()
+        if self._outputs != OUTPUTS:
+            defines["EVERY_OUTPUT"] = True
         if self._environment_map is not None:
             defines["ENVIRONMENT_UNIT"] = ENVIRONMENT_UNIT
             self._environment_map.use(ENVIRONMENT_UNIT)
@@ -106,8 +114,8 @@ class AccumulatePass:
         combine.draw(self._framebuffer, additive=True)
 
     def read(self) -> dict[str, Float32]:
-        """The sums by the names of OUTPUTS: (h, w, 4) float32, row 0 at the top; `direct` has coverage as alpha."""
-        return {name: read_image(texture) for name, texture in zip(OUTPUTS, self._sums, strict=True)}
+        """The sums by their names: (h, w, 4) float32, row 0 at the top; `direct` has coverage as alpha."""
+        return {name: read_image(texture) for name, texture in zip(self._outputs, self._sums, strict=True)}
 
 
 def _environment_texture(context: moderngl.Context, environment: Environment) -> moderngl.Texture:

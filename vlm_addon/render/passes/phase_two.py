@@ -57,14 +57,10 @@ class LightSumPass(ABC):
         width: int,
         height: int,
         visibility: PixelVisibility | None = None,
-        *,
-        has_tags: bool = True,
     ) -> None:
-        """visibility: what the sum is multiplied by, light by light; None for 1. has_tags: whether lights leave out
-        surfaces of their own tag."""
+        """visibility: what the sum is multiplied by, light by light; None for 1."""
         self._context = context
         self._visibility = visibility
-        self._tag_defines: Defines = {} if has_tags else {"NO_TAGS": True}
         self._shaders = shaders
         self._irradiance = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
@@ -72,8 +68,8 @@ class LightSumPass(ABC):
 
     @property
     def _sum_defines(self) -> Defines:
-        """Of shaders that sum lights as far as visibility and tags say."""
-        return {**self._tag_defines, **({} if self._visibility is None else self._visibility.defines)}
+        """Of shaders that sum lights as far as visibility says."""
+        return {} if self._visibility is None else self._visibility.defines
 
     @abstractmethod
     def _prepare(self) -> None:
@@ -111,7 +107,7 @@ class PhaseTwoPass(LightSumPass):
         progress: Progress,
     ) -> None:
         """Fills `picks` from the lights that the last `render` added up, with its arguments."""
-        shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **self._tag_defines, **picks.defines})
+        shader = self._shaders.compute("passes/phase_two.comp", {**_DEFINES, **picks.defines})
         picks.begin(shader, self._irradiance.texture)
         self._walk(shader, picks.per_dispatch(MAX_LIGHTS_PER_DISPATCH), gbuffer, lights, radiosity, progress)
 

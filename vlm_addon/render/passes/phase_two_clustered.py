@@ -100,7 +100,7 @@ class ClusteredPhaseTwoPass(LightSumPass):
         progress: Progress,
     ) -> None:
         """As PhaseTwoPass.pick; picks may be clusters, as rows of `forest.nodes`."""
-        both = _of_both(self._shaders, {**self._tag_defines, **picks.defines})
+        both = _of_both(self._shaders, picks.defines)
         tiles = self._tile_bounds.render(gbuffer)
         picks.begin(both[False], self._irradiance.texture)
         for share, lists in self._walk.lists(tiles, tiles.shown(), forest):

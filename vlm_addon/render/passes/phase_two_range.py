@@ -98,9 +98,7 @@ class RangePhaseTwoPass(LightSumPass):
         progress: Progress,
     ) -> None:
         """As PhaseTwoPass.pick."""
-        shader = self._shaders.compute(
-            "passes/phase_two_range.comp", {**_DEFINES, **self._tag_defines, **picks.defines}
-        )
+        shader = self._shaders.compute("passes/phase_two_range.comp", {**_DEFINES, **picks.defines})
         picks.begin(shader, self._irradiance.texture)
         most = picks.per_dispatch(_MOST_PER_RUN)
         self._walk(shader, most, gbuffer, lights, radiosity, grids, space, bounds, progress)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the noisy effects of a frame found in pictures before, where the plan accumulates over frames."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..core.scene import Float32
+from .passes.motion import Motion, MotionPass
+from .passes.temporal_accumulation import AccumulationSettings, Accumulator
+from .technique import FrameInputs, SceneInputs
+
+if TYPE_CHECKING:
+    import moderngl
+
+
+class EffectHistory:
+    """Accumulators of one frame, by name of effect."""
+
+    def __init__(self, scene: SceneInputs, settings: AccumulationSettings) -> None:
+        size = scene.settings.width, scene.settings.height
+        self._scene = scene
+        self._settings = settings
+        self._size = size
+        self._motion_pass = MotionPass(scene.context, scene.shaders, scene.kept, scene.world, scene.space, *size)
+        self._motion: tuple[int, Motion] | None = None
+        self._accumulators: dict[str, Accumulator] = {}
+        world = scene.world
+        lights = (world.lights, world.materials, scene.world_lights, world.world_radiance)
+        self._lights_key = scene.kept.digests.of(*lights)
+
+    def picture(self, name: str, *, follows_eye: bool) -> int:
+        """The number of the picture, over frames, that the effect is about to look at: what its noise is made from.
+
+        follows_eye: whether what is seen of a place depends on where from.
+        """
+        if name not in self._accumulators:
+            scene = self._scene
+            self._accumulators[name] = Accumulator(
+                scene.context, scene.shaders, scene.kept, name, *self._size, self._settings, follows_eye=follows_eye
+            )
+        return self._accumulators[name].pictures
+
+    def mean(self, name: str, frame: FrameInputs, found: moderngl.Texture, key: str) -> moderngl.Texture:
+        """`found` with what earlier pictures had. key: of the effect's settings."""
+        with self._scene.timer.measure("accumulation"):
+            if self._motion is None or self._motion[0] != frame.sample_index:
+                self._motion = frame.sample_index, self._motion_pass.render(frame.gbuffer)
+            return self._accumulators[name].render(
+                frame.gbuffer,
+                frame.view,
+                self._scene.space,
+                found,
+                key,
+                self._lights_key,
+                self._motion[1],
+                frame.sample_index,
+            )
+
+    def images(self) -> dict[str, Float32]:
+        """How many pictures are in the mean of each pixel, by effect."""
+        return {f"{name}_history_age": each.images()["history_age"] for name, each in self._accumulators.items()}
