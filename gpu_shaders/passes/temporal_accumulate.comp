@@ -97,6 +97,8 @@ void main() {
         vec4 now = texelFetch(found_now, pixel, 0);
         float before = texelFetch(age, pixel, 0).x;
         deviation = texelFetch(age, pixel, 0).y;
+        // Only where a surface's place is no number may these be none.
+        deviation = is_usable(vec4(deviation)) ? deviation : 0.0;
         if (float(near_pixels) < cut_share * float(shown_pixels)) {
             before = 0.0;
         }
@@ -105,6 +107,9 @@ void main() {
             before = min(before, mirror_age * smoothstep(MIRROR, ROUGH, roughness));
         }
         vec4 earlier = texelFetch(reprojected, pixel, 0);
+        if (!is_usable(earlier)) {
+            before = 0.0;
+        }
         if (!is_usable(now)) {
             mean = before > 0.0 ? earlier : vec4(0.0);
             shown = mean;

@@ -69,9 +69,11 @@ class PictureSequence:
         with_motion: bool = True,
         owner: str = "test",
         sample_index: int = 0,
+        surfaces: Callable[[Float32], Float32] | None = None,
         **settings: float,
     ) -> Picture:
-        """The next picture, of a frame of its own. with_motion: whether the accumulator hears of it. settings: of
+        """The next picture, of a frame of its own. surfaces: what to make of each float image of the G-buffer but its
+        geometric normals, (h, w, 4). with_motion: whether the accumulator hears of it. settings: of
         AccumulationSettings."""
         scene = replace(scene, camera=camera or scene.camera)
         width, height = self._size
@@ -83,6 +85,9 @@ class PictureSequence:
             geometry = GpuGeometry(context, local, np.zeros(3))
             view = make_view(local.camera, width, height, geometry.origin, jitter)
             gbuffer = GBufferPass(context, shaders, width, height).render(geometry, view, 0)
+            if surfaces is not None:
+                for texture in (gbuffer.position, gbuffer.shading_normal):
+                    texture.write(surfaces(read_image(texture))[::-1].astype(np.float32).tobytes())
             motion = MotionPass(context, shaders, self.kept, scene, space, width, height).render(gbuffer)
             places = space.world_points(read_image(gbuffer.position)[..., :3])
             faces = read_image(gbuffer.ids)[..., 2]

@@ -10,7 +10,7 @@ import pytest
 
 from tests.render.picture_sequence import HEIGHT, WIDTH, Found, PictureSequence, looking_down_y, moved
 from tests.render.rooms import box_room, camera_at, quad
-from vlm_addon.core.scene import ORTHOGRAPHIC, Camera, Float64, Mesh, SceneSnapshot
+from vlm_addon.core.scene import ORTHOGRAPHIC, Camera, Float32, Float64, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.passes.accumulate import jitter_offsets
 
@@ -312,6 +312,23 @@ def test_what_is_no_value_is_never_shown(sequence: PictureSequence, value: float
     picture = sequence.picture(box_room(), constant(2.0), scene_key="changed")
     if value != -5.0:
         np.testing.assert_allclose(picture.mean[picture.shown][:, 0], 2.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e30])
+def test_surfaces_that_are_nowhere_give_numbers(sequence: PictureSequence, value: float) -> None:
+    """Places and normals that are no numbers, in one of four pixels; a mesh that moves, and changes all the while."""
+
+    def broken(image: Float32) -> Float32:
+        return np.where(np.random.default_rng(1).random((HEIGHT, WIDTH, 1)) < 0.25, np.float32(value), image)
+
+    for index in range(5):
+        scene = before_wall(card(0.3 + 0.05 * index))
+        surfaces = broken if index in (1, 2, 4) else None
+        values = noise(index)
+        picture = sequence.picture(scene, given(values), surfaces=surfaces, follows_eye=True)
+        assert np.isfinite(picture.mean).all()
+        assert (picture.mean >= 0.0).all()
+        assert picture.mean.max() <= 1.0 + 1e-6
 
 
 def test_owners_and_sizes_have_histories_of_their_own(device: Device) -> None:
