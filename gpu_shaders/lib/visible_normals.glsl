@@ -24,6 +24,17 @@ vec3 visible_normal(vec3 normal, vec3 to_view, float alpha, vec2 numbers) {
     return unit_or(alpha * (facet - dot(facet, normal) * normal) + along * normal, normal);
 }
 
+// How dense visible_normal makes the directions that light is reflected from, 1/sr: of one whose half vector is at cos_half
+// to the surface's normal.
+float reflection_density(float cos_half, float cos_view, float alpha) {
+    float alpha_squared = alpha * alpha;
+    float sine_squared = max((1.0 - cos_half) * (1.0 + cos_half), 0.0);
+    float denominator = alpha_squared + sine_squared * (1.0 - alpha_squared);
+    float view_root = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_view * cos_view);
+    float facets = alpha_squared * 0.318309886183791 / max(denominator * denominator, 1e-30);
+    return facets * 0.5 / max(cos_view + view_root, 1e-20);
+}
+
 // Share of what the facets that the view sees reflect that other facets do not hold back: height-correlated Smith over
 // the view's own (Heitz 2014). In [0, 1]; cosines: to the surface's normal.
 float shadowing_share(float cos_light, float cos_view, float alpha) {

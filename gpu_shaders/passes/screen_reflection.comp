@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light that each pixel's specular lobe sends to the eye from what else the picture shows (seed 003, 4.2.4). The ray is
-// followed through squares of pixels: larger ones while it is before all that they show, halved down to a pixel where
+// What the ray of each pixel meets of what the picture shows (seed 003, 4.2.4). The ray is followed through squares of pixels: larger ones while it is before all that they show, halved down to a pixel where
 // it may not be.
-#include "passes/reflection_ray.glsl"
+#include "passes/gbuffer_samplers.glsl"
+#include "passes/sound_radiance.glsl"
 #include "lib/screen_ray.glsl"
 
 layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
 
 layout(binding = LIT_UNIT) uniform sampler2D lit;               // W/(m² sr) that each pixel sends to the eye
 layout(binding = PYRAMID_UNIT) uniform sampler2D pyramid;       // passes/depth_pyramid.comp
-layout(rgba32f, binding = 0) writeonly uniform image2D reflected; // W/(m² sr), times w: how sure it is, in [0, 1]
+layout(binding = RAYS_UNIT) uniform sampler2D rays;             // passes/reflection_rays.comp
+layout(rgba32f, binding = 0) writeonly uniform image2D incoming; // W/(m² sr) along the ray, times w: how sure it is
 layout(rgba32f, binding = 1) writeonly uniform image2D hits;    // place in pixels, distance in m, and w as above
 
+uniform vec3 camera_position;   // m, from the local origin
+uniform vec3 camera_backward;   // unit
+uniform bool is_orthographic;
 uniform mat4 clip_from_local;
 uniform float nearest;      // homogeneous coordinate before which nothing shows
 uniform vec2 pixel_size;    // m: at depth 0, and for each m of depth
@@ -27,6 +31,11 @@ uniform int coarsest;       // level of the pyramid
 #define ON_PLANE 1e-3
 // Share of the reach over which hits fade at its end.
 #define REACH_FADE 0.1
+
+struct Ray {
+    vec3 origin;        // m, from the local origin
+    vec3 direction;     // unit
+};
 
 // How a ray goes through a pixel.
 #define BEFORE 0    // all before its surface
@@ -59,7 +68,7 @@ float depth_step(ivec2 pixel) {
 }
 
 // Where the ray comes to the front of the plane of what a pixel shows, m; below 0 for nowhere.
-float meeting(ivec2 pixel, ReflectionRay ray) {
+float meeting(ivec2 pixel, Ray ray) {
     vec3 normal = texelFetch(gbuffer_geometric_normal, pixel, 0).xyz;
     float towards = -dot(normal, ray.direction);
     float height = dot(normal, ray.origin - texelFetch(gbuffer_position, pixel, 0).xyz);
@@ -69,7 +78,7 @@ float meeting(ivec2 pixel, ReflectionRay ray) {
 // enters, leaves: m along the ray; depth: at which it enters, m. before: the pixel that it comes from. comes_in: whether
 // it was not behind that one.
 Passage pass_pixel(
-    ivec2 pixel, ReflectionRay ray, float depth, float enters, float leaves, ivec2 before, bool comes_in
+    ivec2 pixel, Ray ray, float depth, float enters, float leaves, ivec2 before, bool comes_in
 ) {
     vec4 position = texelFetch(gbuffer_position, pixel, 0);
     vec3 normal = texelFetch(gbuffer_geometric_normal, pixel, 0).xyz;
@@ -109,7 +118,7 @@ Passage pass_pixel(
     return Passage(is_nearer ? BEFORE : BEHIND, 0.0, 0.0, gap, pixel);
 }
 
-Hit follow(ReflectionRay ray, ivec2 pixel) {
+Hit follow(Ray ray, ivec2 pixel) {
     const Hit none = Hit(vec2(0.0), ivec2(0), 0.0, 0.0);
     vec2 size = vec2(textureSize(gbuffer_position, 0));
     ScreenRay line = make_screen_ray(clip_from_local, size, ray.origin, ray.direction, reach, nearest);
@@ -173,20 +182,19 @@ float fade(vec2 place, float distance) {
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(pixel, imageSize(reflected)))) {
+    if (any(greaterThanEqual(pixel, imageSize(incoming)))) {
         return;
     }
     vec4 found = vec4(0.0), seen = vec4(0.0);
-    ReflectionRay ray = reflection_ray(pixel);
-    if (ray.share > 0.0) {
-        Hit hit = follow(ray, pixel);
-        float confidence = hit.confidence * fade(hit.place, hit.distance) * ray.share;
-        if (confidence > 0.0) {
-            vec3 radiance = sound_radiance(texelFetch(lit, hit.pixel, 0).rgb);
-            found = vec4(sound_radiance(confidence * ray.weight * radiance), confidence);
+    vec4 ray = texelFetch(rays, pixel, 0);
+    if (ray.w > 0.0) {
+        Hit hit = follow(Ray(texelFetch(gbuffer_position, pixel, 0).xyz, ray.xyz), pixel);
+        float confidence = hit.confidence * fade(hit.place, hit.distance);
+        if (confidence > 0.0 && all(are_sound(vec4(hit.place, hit.distance, confidence)))) {
+            found = vec4(confidence * sound_radiance(texelFetch(lit, hit.pixel, 0).rgb), confidence);
             seen = vec4(hit.place, hit.distance, confidence);
         }
     }
-    imageStore(reflected, pixel, found);
+    imageStore(incoming, pixel, found);
     imageStore(hits, pixel, seen);
 }

@@ -93,3 +93,26 @@ def test_shadowing_share_is_one_for_mirrors_and_nothing_below_the_surface(device
     plain = above & (np.minimum(light, view) > 1e-3)
     roots = [np.sqrt(1.0 + alpha[plain] ** 2 * (1.0 / c[plain] ** 2 - 1.0)) for c in (light, view)]
     np.testing.assert_allclose(found[plain], (1.0 + roots[1]) / (roots[0] + roots[1]), rtol=1e-5)
+
+
+@pytest.mark.parametrize("cosine", COSINES)
+@pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
+def test_density_times_what_a_direction_carries_is_the_lobe(device: Device, roughness: float, cosine: float) -> None:
+    """Lobe over density is the shadowing share, wherever light comes from."""
+    view = view_at(cosine)
+    half = half_vectors(device, view, roughness)
+    light = 2.0 * (half @ view)[:, None] * half - view
+    cos_light, cos_half = light @ NORMAL, half @ NORMAL
+    kept = cos_light > 0.01
+    inputs = {"h": cos_half, "v": np.full(COUNT, cosine), "a": np.full(COUNT, roughness**2)}
+    density = evaluate(device, FILE, "reflection_density(h, v, a)", inputs)[kept]
+    share = evaluate(device, FILE, "shadowing_share(l, v, a)", {**inputs, "l": cos_light})[kept]
+    lobe = brdf.ggx_brdf(cos_half, cos_light, np.full(COUNT, cosine), roughness)[kept] * cos_light[kept]
+    np.testing.assert_allclose(density * share, lobe, rtol=2e-3)
+
+
+def test_density_stays_finite_at_its_ends(device: Device) -> None:
+    half, view, alpha = (g.ravel() for g in np.meshgrid([0.0, 0.5, 1.0], [0.0, 1e-20, 1.0], [0.0, 1e-8, 1e-4, 1.0]))
+    found = evaluate(device, FILE, "reflection_density(h, v, a)", {"h": half, "v": view, "a": alpha})
+    assert np.isfinite(found).all()
+    assert (found >= 0.0).all()

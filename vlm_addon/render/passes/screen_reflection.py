@@ -7,20 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...core.settings import OWN, setting
-from ..albedo_texture import AlbedoTexture
-from ..gpu_layout import CONSTANTS
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..view import View
 from .depth_pyramid import DepthPyramid
 from .gbuffer import GBuffer
-from .reflection_rays import DIAGONAL, RaySettings, ray_uniforms
+from .reflection_rays import DIAGONAL, GROUP_SIDE, RAYS_UNIT, RaySettings, ReflectionRays, pixel_size
 
 if TYPE_CHECKING:
     import moderngl
 
-GROUP_SIDE = 8
-LIT_UNIT = int(CONSTANTS["FIRST_FREE_UNIT"])
-PYRAMID_UNIT = LIT_UNIT + 1
+LIT_UNIT, PYRAMID_UNIT = RAYS_UNIT + 1, RAYS_UNIT + 4
+DISTANCE_CHANNEL = 2
 ORTHOGRAPHIC_SCALE = 1.0
 """Homogeneous coordinate of all that an orthographic camera sees."""
 
@@ -38,12 +35,12 @@ class ReflectionSettings(RaySettings):
 
 
 class ScreenReflectionPass:
-    """Light that specular lobes send to the eye from other surfaces in the picture: one ray for each pixel and picture,
-    drawn from the lobe, so that the mean over pictures converges to the lobe's integral.
+    """Light that specular lobes send to the eye from other surfaces in the picture: one ray for each pixel and picture.
 
     What a surface sends to the eye stands for what it sends to the reflecting one, so that highlights on it are those
-    that the eye sees. hits: RGBA32F, of the latest picture: place in pixels from the lower left corner, distance from
-    the reflecting surface in m, and confidence; all 0 where nothing was found.
+    that the eye sees. Of the latest picture: hits, RGBA32F: place in pixels from the lower left corner, distance from
+    the reflecting surface in m, and confidence; all 0 where the pixel's own ray found nothing. found, RGBA32F: radiance
+    along that ray in W/(m² sr) times confidence, and confidence.
     """
 
     def __init__(
@@ -52,10 +49,11 @@ class ScreenReflectionPass:
         self._context = context
         self._settings = settings
         self._pyramid = DepthPyramid(context, shaders, width, height)
-        self._albedo = AlbedoTexture(context)
-        defines = {"GROUP_SIDE": GROUP_SIDE, "LIT_UNIT": LIT_UNIT, "PYRAMID_UNIT": PYRAMID_UNIT}
-        self._shader = shaders.compute("passes/screen_reflection.comp", defines)
-        self._reflected, self.hits = (context.texture((width, height), 4, dtype="f4") for _ in range(2))
+        self._rays = ReflectionRays(context, shaders, width, height, DISTANCE_CHANNEL)
+        units = {"RAYS_UNIT": RAYS_UNIT, "LIT_UNIT": LIT_UNIT, "PYRAMID_UNIT": PYRAMID_UNIT}
+        self._shader = shaders.compute("passes/screen_reflection.comp", {"GROUP_SIDE": GROUP_SIDE, **units})
+        self.found = self._rays.incoming
+        self.hits = context.texture((width, height), 4, dtype="f4")
 
     def render(self, gbuffer: GBuffer, view: View, lit: moderngl.Texture, sample_index: int) -> moderngl.Texture:
         """RGBA32F: radiance in W/(m² sr) to the eye times confidence, and confidence in [0, 1].
@@ -65,25 +63,25 @@ class ScreenReflectionPass:
         sends to the eye, RGBA32F of the same size. The next call overwrites the texture.
         """
         settings, (width, height) = self._settings, gbuffer.size
+        self._rays.sample(gbuffer, view, settings, sample_index)
         pyramid = self._pyramid.render(gbuffer, view)
         gbuffer.bind()
-        self._albedo.bind()
+        self._rays.rays.use(RAYS_UNIT)
         lit.use(LIT_UNIT)
         pyramid.use(PYRAMID_UNIT)
-        self._reflected.bind_to_image(0, read=False, write=True)
+        self._rays.incoming.bind_to_image(0, read=False, write=True)
         self.hits.bind_to_image(1, read=False, write=True)
-        at_eye, per_depth = view.picture_width(width)
         followed = {
             "clip_from_local": view.clip_from_local,
             "nearest": ORTHOGRAPHIC_SCALE if view.is_orthographic else view.clip_distances[0],
-            "pixel_size": (at_eye / width, per_depth / width),
+            "pixel_size": pixel_size(view, width),
             "reach": settings.reach * DIAGONAL,
             "thickness": settings.thickness * DIAGONAL,
             "edge_fade": settings.edge_fade,
             "steps": settings.steps,
             "coarsest": self._pyramid.coarsest,
         }
-        set_uniforms(self._shader, ray_uniforms(view, settings, sample_index) | followed)
+        set_uniforms(self._shader, view.camera_uniforms() | followed)
         self._shader.run(-(-width // GROUP_SIDE), -(-height // GROUP_SIDE))
         self._context.memory_barrier()
-        return self._reflected
+        return self._rays.resolve(gbuffer, view, settings, self.hits, sample_index)
