@@ -34,17 +34,4 @@ float reflection_density(float cos_half, float cos_view, float alpha) {
     float facets = alpha_squared * 0.318309886183791 / max(denominator * denominator, 1e-30);
     return facets * 0.5 / max(cos_view + view_root, 1e-20);
 }
-
-// Share of what the facets that the view sees reflect that other facets do not hold back: height-correlated Smith over
-// the view's own (Heitz 2014). In [0, 1]; cosines: to the surface's normal.
-float shadowing_share(float cos_light, float cos_view, float alpha) {
-    if (cos_light <= 0.0 || cos_view <= 0.0) {
-        return 0.0;
-    }
-    float alpha_squared = alpha * alpha;
-    float view_root = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_view * cos_view);
-    float light_root = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_light * cos_light);
-    float both = cos_light * view_root + cos_view * light_root;
-    return min(cos_light * (cos_view + view_root) / max(both, 1e-30), 1.0);
-}
 #endif

@@ -39,8 +39,9 @@ def test_what_samples_carry_is_the_albedo_of_the_lobe(device: Device, roughness:
     view = view_at(cosine)
     half = half_vectors(device, view, roughness)
     light = 2.0 * (half @ view)[:, None] * half - view
-    inputs = {"l": light @ NORMAL, "v": np.full(COUNT, cosine), "a": np.full(COUNT, roughness**2)}
-    carried = evaluate(device, FILE, "shadowing_share(l, v, a)", inputs)
+    inputs = {"h": half @ NORMAL, "l": np.maximum(light @ NORMAL, 0.0)}
+    inputs |= {"v": np.full(COUNT, cosine), "a": np.full(COUNT, roughness**2)}
+    carried = evaluate(device, [FILE, "lib/brdf.glsl"], "ggx_lobe(h, l, v, a) / reflection_density(h, v, a)", inputs)
     _, weights = brdf._visible_normal_quadrature(roughness**2, cosine)
     assert carried.mean() == pytest.approx(weights.sum(), abs=4e-3)
 
@@ -79,36 +80,19 @@ def test_ends_stay_finite_unit_and_above(device: Device) -> None:
     assert (found @ NORMAL >= -1e-6).all()
 
 
-def test_shadowing_share_is_one_for_mirrors_and_nothing_below_the_surface(device: Device) -> None:
-    light, view, alpha = (
-        g.ravel()
-        for g in np.meshgrid([-0.5, 0.0, 1e-20, 1e-6, 0.3, 1.0], [0.0, 1e-20, 1e-6, 0.3, 1.0], [0.0, 1e-4, 1.0])
-    )
-    found = evaluate(device, FILE, "shadowing_share(l, v, a)", {"l": light, "v": view, "a": alpha})
-    assert np.isfinite(found).all()
-    assert ((found >= 0.0) & (found <= 1.0)).all()
-    above = (light > 0.0) & (view > 0.0)
-    assert not found[~above].any()
-    assert found[above & (alpha == 0.0) & (light > 1e-7) & (view > 1e-7)] == pytest.approx(1.0)
-    plain = above & (np.minimum(light, view) > 1e-3)
-    roots = [np.sqrt(1.0 + alpha[plain] ** 2 * (1.0 / c[plain] ** 2 - 1.0)) for c in (light, view)]
-    np.testing.assert_allclose(found[plain], (1.0 + roots[1]) / (roots[0] + roots[1]), rtol=1e-5)
-
-
 @pytest.mark.parametrize("cosine", COSINES)
 @pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
-def test_density_times_what_a_direction_carries_is_the_lobe(device: Device, roughness: float, cosine: float) -> None:
-    """Lobe over density is the shadowing share, wherever light comes from."""
-    view = view_at(cosine)
-    half = half_vectors(device, view, roughness)
-    light = 2.0 * (half @ view)[:, None] * half - view
-    cos_light, cos_half = light @ NORMAL, half @ NORMAL
-    kept = cos_light > 0.01
-    inputs = {"h": cos_half, "v": np.full(COUNT, cosine), "a": np.full(COUNT, roughness**2)}
-    density = evaluate(device, FILE, "reflection_density(h, v, a)", inputs)[kept]
-    share = evaluate(device, FILE, "shadowing_share(l, v, a)", {**inputs, "l": cos_light})[kept]
-    lobe = brdf.ggx_brdf(cos_half, cos_light, np.full(COUNT, cosine), roughness)[kept] * cos_light[kept]
-    np.testing.assert_allclose(density * share, lobe, rtol=2e-3)
+def test_density_is_that_of_half_vectors_turned_into_directions(
+    device: Device, roughness: float, cosine: float
+) -> None:
+    """Distribution of normals that the view sees, by the cosine to the view and the four that reflection spreads."""
+    cos_half = np.linspace(0.2, 1.0, 200)
+    inputs = {"h": cos_half, "v": np.full(200, cosine), "a": np.full(200, roughness**2)}
+    found = evaluate(device, FILE, "reflection_density(h, v, a)", inputs)
+    alpha = roughness**2
+    distribution = alpha**2 / (np.pi * (1.0 - (1.0 - alpha**2) * cos_half**2) ** 2)
+    masking = 2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * (1.0 / cosine**2 - 1.0)))
+    np.testing.assert_allclose(found, distribution * masking / (4.0 * cosine), rtol=1e-3)
 
 
 def test_density_stays_finite_at_its_ends(device: Device) -> None:

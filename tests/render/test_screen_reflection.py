@@ -101,6 +101,40 @@ def test_polish_reflects_as_its_interface_does(device: Device) -> None:
     np.testing.assert_allclose(found.image[sure][:, :3], np.repeat(expected[:, None], 3, 1), rtol=0.02)
 
 
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.5])
+def test_white_metal_of_any_roughness_reflects_all_that_it_finds(device: Device, roughness: float) -> None:
+    """Light 1 everywhere, light scattered more than once among the facets included."""
+    found = reflected(device, mirror_scene(mirror=replace(MATERIALS[0], roughness=roughness)), NO_EDGE)
+    sure = mirrors(found) & (found.confidence > 0.5)
+    assert sure.sum() > 300
+    np.testing.assert_allclose(found.image[sure][:, 0], found.confidence[sure], rtol=0.02)
+
+
+def test_shared_rays_say_in_one_picture_what_many_pictures_say(device: Device) -> None:
+    rough = mirror_scene(mirror=replace(MATERIALS[0], roughness=0.3))
+    lit = np.ones((SIZE[1], SIZE[0], 4), np.float32)
+    lit[:, : SIZE[0] // 2] = 0.1
+    pictures = [reflected(device, rough, NO_EDGE, lit, sample_index=i).image for i in range(33)]
+    mean = np.mean(pictures[1:], axis=0)
+    well = mean[..., 3] > 0.9
+    assert well.sum() > 300
+    error = (pictures[0] - mean)[well][:, 0]
+    assert np.sqrt(np.mean(error**2)) < 0.1 * mean[well][:, 0].mean()
+    assert abs(error.mean()) < 0.01 * mean[well][:, 0].mean()
+
+
+def test_rays_are_not_shared_with_what_is_on_another_surface(device: Device) -> None:
+    """Two rough floors, a step apart in height: what is under the first one's wall does not show in the second."""
+    rough = replace(MATERIALS[0], roughness=0.4)
+    step = quad((0.0, -3.0, 0.15), (3.0, 0.0, 0.0), (0.0, 5.0, 0.0), material=MIRROR, name="step")
+    alone = reflected(device, mirror_scene(step, mirror=rough), NO_EDGE)
+    matt = replace(step, material_indices=np.full(2, MATT, np.int32))
+    without = reflected(device, mirror_scene(matt, mirror=rough), NO_EDGE)
+    shared = (without.material == MIRROR) & (alone.confidence > 0.0)
+    assert shared.sum() > 300
+    np.testing.assert_allclose(alone.image[shared], without.image[shared], atol=1e-6)
+
+
 def _cosines(found: Reflected) -> Float64:
     """Of the view to the normal, perspective."""
     camera = CAMERAS["perspective"].matrix_world[:3, 3] - found.position
