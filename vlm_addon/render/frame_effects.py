@@ -116,7 +116,7 @@ class FrameEffects:
         if plan.computes("screen_reflection"):
             found["screen_reflection"] = self._screen_reflection(plan, frame, light)
         if plan.computes("map_reflection"):
-            found["map_reflection"] = self._map_reflection(plan, frame, found["screen_reflection"])
+            found["map_reflection"] = self._map_reflection(plan, frame)
         if plan.computes("light_mesh_reflection"):
             found["light_mesh_reflection"] = self._light_mesh_reflection(frame)
         wanted = (texture if plan.runs(name) else None for name, texture in found.items())
@@ -146,8 +146,10 @@ class FrameEffects:
         self._shown["light_mesh_reflection"] = found
         return found
 
-    def _map_reflection(self, plan: EffectPlan, frame: FrameInputs, known: moderngl.Texture | None) -> moderngl.Texture:
+    def _map_reflection(self, plan: EffectPlan, frame: FrameInputs) -> moderngl.Texture:
+        """For the rays that the screen, asked before, has not found."""
         maps, settings = self._lamp_maps(), self._settings["map_reflection"]
+        known = self._passes["screen_reflection"].found if plan.computes("screen_reflection") else None
         chosen = self._pass("map_reflection", MapReflectionPass)
 
         def find(index: int) -> moderngl.Texture:
