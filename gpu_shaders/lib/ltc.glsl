@@ -12,6 +12,10 @@
 
 // Squared sizes in the lobe's space up to which a few points of a light stand for it, and from which on they do not.
 #define LTC_POINT_SIZES vec2(0.1, 0.6)
+// Squared size up to which its centroid does alone.
+#define LTC_ONE_POINT_SIZE 0.004
+// Share of a white wall's light that is left out.
+#define LTC_LEAST_LOBE 2e-4
 // Most by which the true lobe is taken to exceed the fitted one.
 #define LTC_MOST_RATIO 3.0
 
@@ -179,14 +183,38 @@ vec3 lobe_reflection(LtcLobe lobe, Reflector reflector, vec3 normal, vec3 to_vie
     return lobe.scale * found.share * mix(1.0, ratio, spread * spread) * fresnel;
 }
 
-// How much a few points of a light stand for it: 1 where it is so small that the lobe is smooth over it, 0 where it is
-// large or its centre next to the horizon. centre: from the point to its centroid. radius: of the light.
-float point_share(LtcLobe lobe, vec3 normal, vec3 centre, float radius) {
+// Angle around the mirror direction beyond which the lobe over pi is less than LTC_LEAST_LOBE, radians: of lights
+// beyond it less is seen than that share of what a white wall shows of them. pi where there is none.
+float lobe_reach(float alpha, float cos_view) {
+    // G2 <= G1 of the eye leaves the distribution times this.
+    float squared = alpha * alpha;
+    float most = 0.5 / (cos_view + sqrt(cos_view * cos_view * (1.0 - squared) + squared));
+    float sine_squared = alpha * (sqrt(most / LTC_LEAST_LOBE) - alpha) / max(1.0 - squared, 1e-6);
+    // Light turns by twice as much as the half vector.
+    return sine_squared >= 0.5 ? FORM_FACTOR_PI : 2.0 * asin(sqrt(max(sine_squared, 0.0)));
+}
+
+// Squared size of a light in the lobe's space, over its distance there. centre: from the point to its centroid. radius:
+// of the light.
+float size_in_lobe(LtcLobe lobe, vec3 centre, float radius) {
     vec3 mapped = to_lobe(lobe, centre);
     float stretched = radius * max(lobe.inverse_widths.x, lobe.inverse_widths.y);
-    float size = stretched * stretched / max(dot(mapped, mapped), 1e-37);
-    float above = clamp(dot(normal, centre) / max(radius, 1e-37), 0.0, 1.0);
-    return above * (1.0 - smoothstep(LTC_POINT_SIZES.x, LTC_POINT_SIZES.y, size));
+    return stretched * stretched / max(dot(mapped, mapped), 1e-37);
+}
+
+// Most by which that exceeds the squared size over the distance in local space.
+float most_stretch(LtcLobe lobe) {
+    vec2 squared = lobe.inverse_widths * lobe.inverse_widths;
+    // The map's smallest singular value, squared, of the plane of x and z.
+    float sum = squared.x + lobe.tilt * lobe.tilt + 1.0;
+    float least = 2.0 * squared.x / (sum + sqrt(max(sum * sum - 4.0 * squared.x, 0.0)));
+    return max(squared.x, squared.y) / min(least, squared.y);
+}
+
+// How much a few points of a light stand for it: 1 where the lobe is smooth over it, 0 where it is large. size:
+// size_in_lobe's.
+float point_share(float size) {
+    return 1.0 - smoothstep(LTC_POINT_SIZES.x, LTC_POINT_SIZES.y, size);
 }
 
 // Radiance towards the eye of a point of a light of radiance 1, as if all of its area were there.

@@ -25,6 +25,7 @@ LOBE = "make_ltc_lobe(lookup_ltc(ltc_table, alpha, dot(n, v)), alpha, 1.0, n, v)
 # A dielectric beside a white metal, without gains.
 REFLECTOR = "Reflector(vec3(0.0), vec3(0.9, 0.5, 0.1), vec3(0.4), 0.6, 1.5, alpha)"
 COUNT = 400
+LEAST_LOBE = 2e-4
 
 
 def unit(vectors: Float64) -> Float64:
@@ -242,18 +243,66 @@ def test_a_small_light_in_the_fit_is_the_lobe_too(device: Device) -> None:
     assert np.abs(found - expected).mean() < 0.02 * expected.mean()
 
 
-def test_points_stand_for_lights_that_are_small_and_above_the_horizon(device: Device) -> None:
-    inputs = case(18, 0.4)
-    shares = [
-        call(device, f"point_share({LOBE}, n, n, size)", inputs | {"size": np.full(COUNT, size, np.float32)})
-        for size in (0.0, 1e-3, 0.03, 3.0)
-    ]
-    assert (shares[0] == 1.0).all()
-    assert (shares[1] == 1.0).all()
-    assert (shares[1] >= shares[2]).all()
-    assert (shares[3] == 0.0).all()
-    side = "normalize(cross(n, v))"
-    assert (call(device, f"point_share({LOBE}, n, {side} - 1e-3 * n, 1e-3)", inputs) == 0.0).all()
+def test_points_stand_for_lights_that_are_small(device: Device) -> None:
+    found = call(device, "point_share(size)", {"size": np.array([0.0, 0.09, 0.3, 0.7, 1e30], np.float32)})
+    assert (found[:2] == 1.0).all()
+    assert 0.2 < found[2] < 0.8
+    assert (found[3:] == 0.0).all()
+
+
+def test_no_light_is_stretched_more_than_the_bound(device: Device) -> None:
+    inputs = case(25) | {"radius": np.full(COUNT, 0.1, np.float32)}
+    ratio = call(device, f"size_in_lobe({LOBE}, l, radius) / (radius * radius)", inputs)
+    bound = call(device, f"most_stretch({LOBE})", inputs)
+    assert (ratio <= 1.001 * bound).all()
+    # Met where the light is in the least direction of the map.
+    _, to_lobe, _ = frames(inputs)
+    inputs["l"] = np.linalg.svd(to_lobe)[2][:, 2].astype(np.float32)
+    ratio = call(device, f"size_in_lobe({LOBE}, l, radius) / (radius * radius)", inputs)
+    assert np.median(ratio / bound) > 0.95
+
+
+def test_sizes_are_those_in_the_lobes_space(device: Device) -> None:
+    """Never less than the distance of any two ends of the mapped light from one another, over their distance."""
+    inputs = triangles(case(21), 22, 0.02, is_above=True)
+    corners = np.stack([inputs[name].astype(float) for name in "abc"], axis=1)
+    centre = corners.mean(axis=1, keepdims=True)
+    radius = np.linalg.norm(corners - centre, axis=2).max(axis=1)
+    inputs["radius"] = radius.astype(np.float32)
+    _, to_lobe, _ = frames(inputs)
+    to_lobe[:, 2] = 0.0
+    arms = np.linalg.norm(np.einsum("nij,nkj->nki", to_lobe, corners - centre), axis=2).max(axis=1)
+    found = call(device, f"size_in_lobe({LOBE}, (a + b + c) / 3.0, radius)", inputs)
+    _, to_lobe, _ = frames(inputs)
+    distance = np.linalg.norm(np.einsum("nij,nkj->nki", to_lobe, centre)[:, 0], axis=1)
+    assert (np.sqrt(found) >= 0.98 * arms / distance).all()
+    assert (np.sqrt(found) <= 1.02 * (radius / to_lobe_widths(inputs)) / distance).all()
+
+
+def to_lobe_widths(inputs: dict[str, np.ndarray]) -> Float64:
+    """(n,) the narrower width of each lobe."""
+    _, _, cosine = frames(inputs)
+    alpha = inputs["alpha"].astype(float)
+    return np.asarray(ltc.lookup_ltc(np.sqrt(alpha), cosine)[:, 1:3].min(axis=1) * alpha)
+
+
+def test_nothing_of_a_lobe_is_beyond_its_reach(device: Device) -> None:
+    inputs = case(23)
+    inputs["alpha"] = np.geomspace(1e-4, 1.0, COUNT).astype(np.float32)
+    reach = call(device, "lobe_reach(alpha, dot(n, v))", inputs).astype(float)
+    assert (reach[:40] < 0.3).all()
+    assert reach[-1] == pytest.approx(np.pi)
+    random = np.random.default_rng(24)
+    normal, eye = unit(inputs["n"].astype(float)), unit(inputs["v"].astype(float))
+    mirror = 2.0 * (normal * eye).sum(-1, keepdims=True) * normal - eye
+    for _ in range(50):
+        # Just outside of the cone, all around it.
+        across = unit(np.cross(mirror, random.normal(size=(COUNT, 3))))
+        angle = (reach * random.uniform(1.0, 1.5, COUNT))[:, None]
+        direction = np.cos(angle) * mirror + np.sin(angle) * across
+        lobe, _ = exact_lobe(inputs, direction)
+        outside = (reach < 2.0) & ((direction * normal).sum(-1) > 0.0)
+        assert (np.pi * lobe[outside] < 1.01 * LEAST_LOBE).all()
 
 
 def test_lights_of_no_size_and_mirrors_stay_finite(device: Device) -> None:
