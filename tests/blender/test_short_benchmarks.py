@@ -15,7 +15,16 @@ from types import ModuleType
 import pytest
 from PIL import Image
 
-from benchmarks import lightwave_energy, many_light, rsm_gather, rsm_tables, second_order, technique_sheet, world_light
+from benchmarks import (
+    effects,
+    lightwave_energy,
+    many_light,
+    rsm_gather,
+    rsm_tables,
+    second_order,
+    technique_sheet,
+    world_light,
+)
 from vlm_addon.render.technique import technique_list
 
 Run = Callable[..., str]
@@ -154,6 +163,16 @@ def test_many_light_has_the_published_figures_and_every_visibility(run: Run, mon
     for rows, variants in zip(others, (many_light.VISIBILITIES, many_light.MANY_LIGHTS), strict=True):
         assert [row[0] for row in rows] == [*variants, "noise of the reference"]
         assert all(len(numbers(row[1:4])) == 3 for row in rows[:-1])
+
+
+def test_effects_compares_plans_with_everything(run: Run) -> None:
+    scenes = ("empty_room", effects.NO_LIGHT)
+    printed = run(effects, "--scenes", *scenes, "--size", 16, 12, "--samples", 1, "--frames", 1)
+    (rows,) = tables(printed)
+    assert [row[0] for row in rows] == [*scenes]
+    assert all(len(numbers(row[1:])) == 6 for row in rows)
+    assert "Shadows: skip, nothing can occlude anything" in printed
+    assert all(float(row[-1]) <= 1.0 for row in rows)
 
 
 @pytest.mark.parametrize("module", [rsm_gather, lightwave_energy], ids=lambda module: module.__name__)

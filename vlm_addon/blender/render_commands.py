@@ -16,7 +16,7 @@ from ..core.errors import InvalidInput
 from ..core.progress import Progress
 from ..core.scene import Finding
 from ..core.settings import describe, from_mapping
-from ..render.frame_effects import effect_settings
+from ..render.frame_effects import checked_effects
 from ..render.frame_types import Frame, RenderSettings, require_in_range
 from ..render.technique import technique_by_name, technique_list
 from ..terminal import TerminalProgress, table
@@ -99,11 +99,9 @@ def _asked_settings(arguments: Namespace, technique: str) -> RenderSettings:
     """What the command line says of a frame, of a size that is not known yet. Raises InvalidInput."""
     chosen = _setting_texts(arguments.set)
     from_mapping(technique_by_name(technique).settings, chosen, f"technique {technique!r}")
-    effects = _setting_texts(arguments.effect)
+    effects = checked_effects(_setting_texts(arguments.effect))
     width, height = arguments.size or (1, 1)
-    settings = RenderSettings(width, height, technique, chosen, effects=effects)
-    effect_settings(settings)
-    return settings
+    return RenderSettings(width, height, technique, chosen, effects=effects)
 
 
 def _with_scene_settings(settings: RenderSettings, size: tuple[int, int] | None) -> RenderSettings:

@@ -42,15 +42,22 @@ SETTINGS: Mapping[str, type] = MappingProxyType(
 REFLECTIONS = ("screen_reflection", "map_reflection", "light_mesh_reflection")
 
 
-def effect_settings(settings: RenderSettings) -> dict[str, Any]:
-    """Settings of each effect in SETTINGS. Raises InvalidInput for one that is unknown or out of range."""
-    _, given = parse_choices(settings.effects)
+def checked_effects(values: Mapping[str, Any]) -> dict[str, Any]:
+    """`values` of RenderSettings.effects (numbers, or texts as typed on a command line), each of its setting's type.
+
+    Raises InvalidInput for an effect, a choice or a setting that there is not, or a value out of range.
+    """
+    choices, given = parse_choices(values)
     for name in given.keys() - SETTINGS.keys():
         raise InvalidInput(f"effect {name!r}", "it has no settings", f"these have: {', '.join(SETTINGS)}")
-    return {
-        name: settings_type(**checked_values(settings_type, given.get(name, {}), f"effect {name!r}"))
-        for name, settings_type in SETTINGS.items()
-    }
+    checked = {name: checked_values(SETTINGS[name], values, f"effect {name!r}") for name, values in given.items()}
+    return choices | {f"{name}.{key}": value for name, found in checked.items() for key, value in found.items()}
+
+
+def effect_settings(settings: RenderSettings) -> dict[str, Any]:
+    """Settings of each effect in SETTINGS. Raises InvalidInput as `checked_effects`."""
+    _, given = parse_choices(checked_effects(settings.effects))
+    return {name: settings_type(**given.get(name, {})) for name, settings_type in SETTINGS.items()}
 
 
 class FrameEffects:
