@@ -89,12 +89,12 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(result)))) {
         return;
     }
+    vec4 now = texelFetch(found_now, pixel, 0);
     vec4 mean = vec4(0.0);
-    vec4 shown = vec4(0.0);
+    vec4 shown = is_usable(now) ? max(now, 0.0) : vec4(0.0);
     float pictures = 0.0;
     float deviation = 0.0;
     if (pixel_shows_geometry(pixel)) {
-        vec4 now = texelFetch(found_now, pixel, 0);
         float before = texelFetch(age, pixel, 0).x;
         deviation = texelFetch(age, pixel, 0).y;
         // Only where a surface's place is no number may these be none.

@@ -153,10 +153,10 @@ class Accumulator:
         motion: Motion | None = None,
         sample_index: int = 0,
     ) -> moderngl.Texture:
-        """What to show of `found` and of the history, RGBA32F, finite and at least 0, 0 where no surface shows.
+        """What to show of `found` and of the history, RGBA32F, finite and at least 0.
 
         The average over the pictures of a frame is the mean of all that counts; with one picture a frame, so is the
-        result; without any history it is `found` itself.
+        result; without any history, or where no surface shows, it is `found` itself.
 
         gbuffer, view, space: of the picture. found: of the picture's size, float, from one to four channels. key: hash
         of all without which the history means nothing (settings of the effect). scene_key: hash of what else the
