@@ -146,7 +146,8 @@ def _by_cycles(size: int, radius_m: float) -> Float64:
 def _occlusion_material(radius_m: float) -> Iterator[None]:
     """Every surface glows with how open it is."""
     material = bpy.data.materials.new("openness")
-    material.use_nodes = True
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     output, emission = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeEmission")

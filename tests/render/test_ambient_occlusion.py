@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,8 +12,8 @@ import pytest
 
 from tests.open_corner import open_beside_wall
 from tests.render.closed_rooms import inward_box
+from tests.render.open_pictures import RESOLUTION, SIZE, by_rays, look, mean_error
 from tests.render.rooms import camera_at, quad
-from vlm_addon.core.ambient_occlusion import openness
 from vlm_addon.core.scene import (
     AREA,
     ORTHOGRAPHIC,
@@ -21,13 +21,11 @@ from vlm_addon.core.scene import (
     SPOT,
     SUN,
     Camera,
-    Float64,
     Light,
     Material,
     Mesh,
     SceneSnapshot,
 )
-from vlm_addon.core.triangle_tree import build_tree
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.kept import Kept
@@ -44,9 +42,6 @@ from vlm_addon.render.passes.gbuffer import GBuffer, GBufferPass
 from vlm_addon.render.passes.rsm import LampReflections
 from vlm_addon.render.view import make_view
 
-SIZE = (56, 40)
-PICTURES = 16
-RESOLUTION = 128
 GREY = (Material("grey"),)
 FLOOR = quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), name="floor")
 WALL = quad((-2, 1, 0), (4, 0, 0), (0, 0, 2), name="wall")
@@ -58,67 +53,8 @@ TOWARDS_BOTH = camera_at((0.3, -1.9, 1.6), (0.0, 0.6, 0.1), lens=40.0)
 FLOOR_ONLY = camera_at((0.0, -0.5, 3.0), (0.0, 0.5, 0.0), lens=90.0)
 
 
-@dataclass(frozen=True)
-class Seen:
-    """Mean openness of pictures, and what the pixels show, (h, w) and (h, w, 3), row 0 at the top, world space."""
-
-    open: Float64
-    positions: Float64
-    normals: Float64
-    radius_m: float
-
-    def on(self, axis: int, value: float) -> np.ndarray:
-        """(h, w): pixels of the plane on which a coordinate has a value."""
-        return (np.abs(self.positions[..., axis] - value) < 1e-4) & np.any(self.normals != 0.0, axis=2)
-
-
 def scene(meshes: Sequence[Mesh], camera: Camera, lights: Sequence[Light] = ()) -> SceneSnapshot:
     return SceneSnapshot("scene", tuple(meshes), GREY, lights=tuple(lights), camera=camera)
-
-
-def look(
-    device: Device,
-    snapshot: SceneSnapshot,
-    radius_m: float,
-    pictures: int = PICTURES,
-    size: tuple[int, int] = SIZE,
-    with_maps: bool = False,
-    **values: object,
-) -> Seen:
-    """Openness of the same pixels' middles from several sets of directions."""
-    low, high = snapshot.bounds()
-    share = radius_m / float(np.linalg.norm(high - low))
-    settings = OcclusionSettings(radius=share, **values)  # type: ignore[arg-type]
-    with device.current() as context:
-        space = make_local_space(snapshot)
-        local = space.scene(snapshot)
-        assert local.camera is not None
-        geometry = GpuGeometry(context, local, np.zeros(3))
-        view = make_view(local.camera, *size, geometry.origin)
-        chosen = AmbientOcclusionPass(context, device.shaders, *size, settings)
-        surfaces = GBufferPass(context, device.shaders, *size)
-        found = LampReflections(context, device.shaders, Kept(), snapshot, RESOLUTION, 2) if with_maps else None
-        total = np.zeros(size[::-1])
-        for index in range(pictures):
-            gbuffer = surfaces.render(geometry, view, 0)
-            maps = () if found is None else found.maps()
-            total += read_image(chosen.render(gbuffer, view, index, maps, space))[..., 0]
-        positions, normals = (read_image(texture)[..., :3] for texture in (gbuffer.position, gbuffer.geometric_normal))
-        return Seen(total / pictures, space.world_points(positions), normals.astype(float), radius_m)
-
-
-def by_rays(seen: Seen, snapshot: SceneSnapshot, strata: int = 12) -> Float64:
-    """(h, w) openness by rays; 1 where nothing shows."""
-    shown = np.any(seen.normals != 0.0, axis=2)
-    corners = np.concatenate([mesh.positions[mesh.triangles] for mesh in snapshot.meshes])
-    normals = seen.normals[shown]
-    result = np.ones(shown.shape)
-    result[shown] = openness(build_tree(corners), seen.positions[shown], normals, normals, seen.radius_m, strata)
-    return result
-
-
-def mean_error(found: Float64, truth: Float64, where: np.ndarray) -> float:
-    return float(np.abs(found - truth)[where].mean())
 
 
 @pytest.mark.parametrize("kind", ["PERSPECTIVE", ORTHOGRAPHIC])
