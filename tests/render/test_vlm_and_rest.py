@@ -286,3 +286,12 @@ def test_a_frame_that_leaves_nothing_out_and_keeps_nothing_is_the_same(device: D
     planned, whole = (device.render(scene, lights, replace(settings, economical=each)) for each in (True, False))
     for name, image in planned.images.items():
         np.testing.assert_array_equal(image, whole.images[name], err_msg=name)
+
+
+def test_the_rest_bounces_where_virtual_lights_are_black(device: Device) -> None:
+    scene = room_with_flag()
+    lights = lights_of(scene)
+    black = replace(lights, colour=np.zeros_like(lights.colour))
+    of_rest = irradiance(device, without_bounce(scene, Choice(DYNAMIC)), None, "rsm_gather")
+    assert of_rest.max() > 0.0
+    np.testing.assert_array_equal(irradiance(device, scene, black, rest="rsm_gather"), of_rest)
