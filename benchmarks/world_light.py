@@ -29,9 +29,9 @@ from vlm_addon.core.world_light import world_lights
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.lamp_shadows import LampShadows
 from vlm_addon.render.lit_lights import radiosity_of
 from vlm_addon.render.passes.phase_one import PhaseOnePass
-from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.terminal import table
 
 MAP_SIZE = (256, 512)

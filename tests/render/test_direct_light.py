@@ -27,10 +27,10 @@ from vlm_addon.core.scene import (
 )
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.lamp_shadows import LampShadows
 from vlm_addon.render.passes.accumulate import read_image
 from vlm_addon.render.passes.direct_light import DirectLightPass
 from vlm_addon.render.passes.gbuffer import GBufferPass
-from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.render.view import make_view
 
 WIDTH, HEIGHT = 24, 16

@@ -14,11 +14,11 @@ from tests.render.closed_rooms import empty_room, inward_box
 from tests.render.rooms import camera_at, quad
 from vlm_addon.core.reach import in_reach
 from vlm_addon.core.scene import AREA, DIFFUSE, POINT, SPOT, SUN, Light, Material, Mesh, SceneSnapshot, Texture
+from vlm_addon.render import lamp_shadows
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.kept_shadow_maps import KeptShadowMaps
 from vlm_addon.render.lamp_scenes import LampScenes
-from vlm_addon.render.passes import shadow_map
 
 DOWN = {"spot_angle": 0.8, "spot_blend": 0.2}
 LEFT = Light("left", SPOT, (30.0, 30.0, 30.0), (-3.0, 0.0, 2.0), **DOWN)
@@ -207,7 +207,7 @@ def test_memory_does_not_grow_while_lamps_come_and_go(used: Device) -> None:
 
 
 def shadow_maps_kept(device: Device) -> int:
-    return len(device.kept.hold(shadow_map.KIND, KeptShadowMaps))
+    return len(device.kept.hold(lamp_shadows.KIND, KeptShadowMaps))
 
 
 def textures_alive(device: Device) -> int:

@@ -13,9 +13,9 @@ from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh, empty_lig
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Light, Material, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.lamp_shadows import LampShadows
 from vlm_addon.render.lit_lights import radiosity_of
 from vlm_addon.render.passes.phase_one import PhaseOnePass
-from vlm_addon.render.passes.shadow_map import LampShadows
 
 POWER = (10.0, 20.0, 30.0)
 COLOUR = np.array([0.5, 0.25, 2.0], np.float32)

@@ -14,9 +14,10 @@ from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Float64, Light, Materia
 from vlm_addon.render.device import Device
 from vlm_addon.render.geometry import GpuGeometry
 from vlm_addon.render.kept import Kept
+from vlm_addon.render.lamp_shadows import LampShadows, StillLamps
 from vlm_addon.render.local_space import LocalSpace
 from vlm_addon.render.passes.phase_one import PhaseOnePass
-from vlm_addon.render.passes.shadow_map import LampShadows, ShadowMapPass, StillLamps
+from vlm_addon.render.passes.shadow_map import ShadowMapPass
 from vlm_addon.render.shadow_casters import ShadowCasters
 from vlm_addon.render.shadow_views import shadow_kind
 

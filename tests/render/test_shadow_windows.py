@@ -25,11 +25,11 @@ from vlm_addon.render import shadow_windows
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.render.geometry import GpuGeometry
+from vlm_addon.render.lamp_shadows import LampShadows
 from vlm_addon.render.passes import direct_light
 from vlm_addon.render.passes.distance_range import DistanceRange
 from vlm_addon.render.passes.gbuffer import GBufferPass
 from vlm_addon.render.passes.phase_one import PhaseOnePass
-from vlm_addon.render.passes.shadow_map import LampShadows
 from vlm_addon.render.shadow_windows import FADE, WHOLE_SCENE, same_window, sample_windows, view_windows
 from vlm_addon.render.view import make_view
 

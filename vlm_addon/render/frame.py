@@ -24,12 +24,12 @@ from .frame_plan import FramePlanner
 from .frame_types import Frame, RenderSettings, require_in_range
 from .kept import Kept
 from .kept_geometry import kept_geometry
+from .lamp_shadows import LampShadows, StillLamps
 from .local_space import LocalSpace, make_local_space
 from .passes.accumulate import AccumulatePass, PictureLight, jitter_offsets
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
 from .passes.screen_census import ScreenCensusPass
-from .passes.shadow_map import LampShadows, StillLamps
 from .picture_shares import direct_world_lights, picture_shares
 from .shadow_casters import ShadowCasters
 from .technique import FrameInputs, SceneInputs, technique_by_name

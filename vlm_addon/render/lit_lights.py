@@ -23,7 +23,7 @@ from .virtual_lights import GpuVirtualLights
 if TYPE_CHECKING:
     import moderngl
 
-    from .passes.shadow_map import LampShadows
+    from .lamp_shadows import LampShadows
 
 PHASE_ONE, RADIOSITY, VIRTUAL_LIGHTS = "phase one", "radiosity", "virtual lights"
 

@@ -21,11 +21,11 @@ from . import techniques
 from .frame_types import RenderSettings
 from .geometry import GpuGeometry
 from .kept import Kept
+from .lamp_shadows import LampShadows
 from .light_structures import LightStructures
 from .local_space import LocalSpace
 from .passes.gbuffer import GBuffer
 from .passes.rsm import LampReflections
-from .passes.shadow_map import LampShadows
 from .shader_library import ShaderLibrary
 from .view import View
 from .virtual_lights import GpuVirtualLights

@@ -14,12 +14,13 @@ from ...core.scene import Float64
 from ..albedo_texture import AlbedoTexture
 from ..fullscreen import FullscreenPass
 from ..gpu_layout import CONSTANTS, LAMP
+from ..lamp_shadows import LampShadows
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..shadow_windows import ALL_DISTANCES, FADE, ViewWindow, view_windows
 from ..view import View
 from .distance_range import DistanceRange
 from .gbuffer import GBuffer
-from .shadow_map import LampShadows, ShadowMap
+from .shadow_map import ShadowMap
 
 if TYPE_CHECKING:
     import moderngl

@@ -13,9 +13,9 @@ from ...core.light_mesh import VirtualLightMesh
 from ...core.progress import Progress, silent, step
 from ...core.scene import Float32, Float64
 from ..gpu_layout import CONSTANTS, LAMP, SOURCE_SAMPLE
+from ..lamp_shadows import LampShadows
 from ..shader_library import ShaderLibrary, set_uniforms
 from ..shadow_windows import WHOLE_SCENE, ShadowWindow, sample_windows
-from .shadow_map import LampShadows
 
 if TYPE_CHECKING:
     import moderngl
