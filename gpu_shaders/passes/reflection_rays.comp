@@ -9,6 +9,14 @@ layout(rgba32f, binding = 0) writeonly uniform image2D rays; // unit direction, 
 
 uniform uint sample_index;
 
+// Two numbers in [0, 1). Those of a tile of 4 x 4 pixels are evenly spread; tiles are turned against each other, or all of
+// the picture would miss the same narrow light.
+vec2 ray_numbers(uvec2 pixel) {
+    uint tile = pcg_hash((pixel.x >> 2) + pcg_hash(pixel.y >> 2));
+    vec2 turn = vec2(unit_float(tile), unit_float(pcg_hash(tile)));
+    return min(fract(spread_pattern(pixel, 0u, sample_index) + turn), vec2(1.0 - 1.0 / 16777216.0));
+}
+
 vec4 sampled_ray(ivec2 pixel) {
     Lobe lobe = pixel_lobe(pixel);
     if (!(lobe.share > 0.0)) {
@@ -17,7 +25,7 @@ vec4 sampled_ray(ivec2 pixel) {
     vec3 normal = lobe.surface.shading_normal, facet = normal;
     float alpha = lobe.reflector.alpha;
     if (alpha > LEAST_ALPHA) {
-        facet = visible_normal(normal, lobe.to_eye, alpha, spread_pattern(uvec2(pixel), 0u, sample_index));
+        facet = visible_normal(normal, lobe.to_eye, alpha, ray_numbers(uvec2(pixel)));
     }
     vec3 direction = normalize(reflect(-lobe.to_eye, facet));
     float density = reflection_density(clamp(dot(normal, facet), 0.0, 1.0), lobe.cos_view, alpha);

@@ -119,8 +119,8 @@ def test_shared_rays_say_in_two_pictures_what_many_pictures_say(device: Device) 
     well = mean[..., 3] > 0.9
     assert well.sum() > 300
     error = (0.5 * (pictures[0] + pictures[1]) - mean)[well][:, 0]
-    assert np.sqrt(np.mean(error**2)) < 0.1 * mean[well][:, 0].mean()
-    assert abs(error.mean()) < 0.03 * mean[well][:, 0].mean()
+    assert np.sqrt(np.mean(error**2)) < 0.13 * mean[well][:, 0].mean()
+    assert abs(error.mean()) < 0.02 * mean[well][:, 0].mean()
 
 
 def test_rays_are_not_shared_with_what_is_on_another_surface(device: Device) -> None:
