@@ -38,7 +38,7 @@ from vlm_addon.core.scene_facts import (
 
 BLOCKED = Occlusion(True, "'Box' has other surfaces on both sides")
 OPEN = Occlusion(False, "nothing can occlude anything: each of the 12 triangles has the whole scene on one side")
-VLM = TechniqueFacts("vlm", has_reflecting_lights=True)
+VLM = TechniqueFacts("vlm", has_reflecting_lights=True, gains_by_occlusion=True)
 LAMPS = LampFacts(("Key", "Fill"), (), (), ())
 NO_LAMPS = LampFacts((), (), (), ())
 SCREEN = ScreenFacts(1000, 800, 250, np.zeros(3), np.ones(3))
@@ -115,6 +115,7 @@ NOT_CALLED_FOR = [
     ("light_visibility", {"technique": replace(VLM, asks_visibility=True), "occlusion": OPEN}, "12 triangles"),
     ("light_visibility", {"technique": replace(VLM, asks_visibility=True), **DARK}, "no indirect light"),
     ("ambient_occlusion", {"technique": replace(VLM, knows_visibility=True)}, "'vlm' knows by itself"),
+    ("ambient_occlusion", {"technique": replace(VLM, gains_by_occlusion=False)}, "farther from the truth"),
     ("ambient_occlusion", {"occlusion": OPEN}, "12 triangles"),
     ("ambient_occlusion", DARK, "no indirect light"),
     ("ambient_occlusion", {"technique": TechniqueFacts("direct", has_indirect=False)}, "'direct'"),

@@ -177,6 +177,9 @@ def _ambient_occlusion(facts: SceneFacts, before: Before) -> Verdict:
         return Verdict(IMPOSSIBLE, f"technique {facts.technique.name!r} has no indirect light to darken")
     if facts.technique.knows_visibility:
         return Verdict(NOT_WANTED, f"technique {facts.technique.name!r} knows by itself where its light is occluded")
+    if not facts.technique.gains_by_occlusion:
+        text = f"measured, it takes the indirect light of technique {facts.technique.name!r} farther from the truth"
+        return Verdict(NOT_WANTED, text)
     if not facts.occlusion.possible:
         return Verdict(NOT_WANTED, f"no indirect light is occluded: {facts.occlusion.reason}")
     if "indirect_light" not in before.running:

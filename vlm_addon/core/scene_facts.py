@@ -26,7 +26,8 @@ class TechniqueFacts:
     something stands in its way. asks_visibility: whether its settings ask for what the plan may leave out for that.
     specular: whether it has indirect light in glossy surfaces: none, its own, or what effects add.
     has_reflecting_lights: whether it has virtual lights, which are polygons that show in glossy surfaces;
-    bounces_without_lights: whether it finds other light beside theirs.
+    bounces_without_lights: whether it finds other light beside theirs. gains_by_occlusion: whether ambient occlusion
+    was measured to bring its indirect light nearer to the truth.
     """
 
     name: str
@@ -36,6 +37,7 @@ class TechniqueFacts:
     specular: str = SPECULAR_BY_EFFECTS
     has_reflecting_lights: bool = False
     bounces_without_lights: bool = False
+    gains_by_occlusion: bool = False
 
 
 @dataclass(frozen=True)

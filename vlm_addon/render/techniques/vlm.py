@@ -130,7 +130,13 @@ class VirtualLightMeshTechnique(Technique):
     def facts(cls, settings: Any) -> TechniqueFacts:
         """That virtual lights are polygons, and whether something is asked to tell where they are occluded."""
         asks = settings.visibility != NONE
-        return TechniqueFacts(cls.name, knows_visibility=asks, asks_visibility=asks, has_reflecting_lights=True)
+        return TechniqueFacts(
+            cls.name,
+            knows_visibility=asks,
+            asks_visibility=asks,
+            has_reflecting_lights=True,
+            gains_by_occlusion=True,
+        )
 
     def __init__(self, scene: SceneInputs, settings: Any) -> None:
         super().__init__(scene, settings)
