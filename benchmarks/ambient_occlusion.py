@@ -41,6 +41,7 @@ RADII = (0.02, 0.05, 0.1, 0.2)
 PICTURES = 16
 STRATA = 12
 RESOLUTION, AREA_MAPS = 256, 4
+SHOWN_SIDE = 288
 CYCLES_SAMPLES, NODE_SAMPLES = 4, 64
 
 
@@ -179,7 +180,8 @@ def _rows(scene: str, radius: float, found: Estimates, truth: Float64, cycles: F
 
 
 def _grey(image: Float64) -> Image.Image:
-    return Image.fromarray(np.round(255.0 * np.clip(image, 0.0, 1.0)).astype(np.uint8)).convert("RGB")
+    grey = Image.fromarray(np.round(255.0 * np.clip(image, 0.0, 1.0)).astype(np.uint8)).convert("RGB")
+    return grey.resize((SHOWN_SIDE, SHOWN_SIDE), Image.Resampling.NEAREST)
 
 
 if __name__ == "__main__":
