@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The mean of what this picture found and what earlier ones did, kept for the next; earlier ones held near to what the
-// neighbourhood has now where something changes (variance clipping: Salvi 2016).
+// The mean of what this picture found and what earlier ones did, kept for the next. CLAMPS: where something changes,
+// earlier ones are held near to what the neighbourhood has now (variance clipping: Salvi 2016).
 #include "passes/gbuffer_samplers.glsl"
 
 layout(local_size_x = GROUP_SIDE, local_size_y = GROUP_SIDE) in;
@@ -16,10 +16,12 @@ layout(rgba32f, binding = 3) writeonly uniform image2D result;
 
 uniform float most_age;
 uniform float pictures_of_frame; // so far, with this one
-uniform float clamp_width;      // standard deviations; 0 takes earlier pictures as they are
 uniform float mirror_age;       // most pictures of a history where a surface is ROUGH, none at a MIRROR; below 0: any
 uniform float cut_share;        // of the surface's pixels must have a history near by, or none counts
+#ifdef CLAMPS
+uniform float clamp_width;      // standard deviations
 uniform float pixel_at_0, pixel_per_depth; // a pixel's size: pixel_at_0 + pixel_per_depth x depth
+#endif
 
 #define REACH 2                 // pixels to each side that are the neighbourhood
 #define LARGEST_HALF 6e4
@@ -30,6 +32,11 @@ bool is_usable(vec4 value) {
     return all(lessThan(floatBitsToUint(value) & 0x7fffffffu, uvec4(floatBitsToUint(1e17))));
 }
 
+float largest(vec4 v) {
+    return max(max(v.x, v.y), max(v.z, v.w));
+}
+
+#ifdef CLAMPS
 bool is_same_surface(ivec2 pixel, ivec2 other) {
     vec4 here = texelFetch(gbuffer_position, pixel, 0);
     vec3 between = texelFetch(gbuffer_position, other, 0).xyz - here.xyz;
@@ -38,10 +45,6 @@ bool is_same_surface(ivec2 pixel, ivec2 other) {
     return pixel_shows_geometry(other) && abs(dot(between, plane)) < reach
         && dot(texelFetch(gbuffer_shading_normal, other, 0).xyz, texelFetch(gbuffer_shading_normal, pixel, 0).xyz)
             > SAME_NORMAL_COSINE;
-}
-
-float largest(vec4 v) {
-    return max(max(v.x, v.y), max(v.z, v.w));
 }
 
 // `earlier` held within clamp_width standard deviations of the mean of what pixels of one surface found around `pixel`.
@@ -78,6 +81,7 @@ vec4 held(ivec2 pixel, vec4 earlier, inout float deviation) {
     deviation = kept == earlier ? deviation : largest(around);
     return kept;
 }
+#endif
 
 // Between a history, which may be anything where it does not count, and what is found now.
 vec4 mixed(vec4 earlier, vec4 now, float share) {
@@ -115,12 +119,14 @@ void main() {
             shown = mean;
             pictures = before;
         } else {
-            if (before > 0.0 && clamp_width > 0.0) {
+#ifdef CLAMPS
+            if (before > 0.0) {
                 vec4 kept = held(pixel, earlier, deviation);
                 // What had to be changed is no mean of anything: it counts as one picture.
                 before = kept == earlier ? before : min(before, 1.0);
                 earlier = kept;
             }
+#endif
             pictures = before + 1.0;
             float step = before > 0.0 ? largest(abs(now - earlier)) : 0.0;
             deviation = before > 0.0 ? sqrt((deviation * deviation + step * step / pictures) * before / pictures) : 0.0;

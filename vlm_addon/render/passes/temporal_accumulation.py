@@ -229,15 +229,17 @@ class Accumulator:
         """Fills the result and the history."""
         history = self._history
         units = {f"{name}_UNIT": FIRST_UNIT + index for index, name in enumerate(("FOUND", "REPROJECTED", "AGE"))}
-        shader = self._shaders.compute("passes/temporal_accumulate.comp", {**self._defines, **units})
+        settings = self._settings
+        clamp_width = 0.0 if is_settled else settings.clamp
+        variant = {"CLAMPS": 1} if clamp_width > 0.0 else {}
+        shader = self._shaders.compute("passes/temporal_accumulate.comp", {**self._defines, **units, **variant})
         for unit, texture in enumerate((found, self._reprojected, self._age), FIRST_UNIT):
             texture.use(unit)
         for unit, texture in enumerate((history.irradiance, history.place, history.normal, self._result)):
             texture.bind_to_image(unit, read=False, write=True)
-        settings = self._settings
         uniforms = {
             "most_age": settings.history,
-            "clamp_width": 0.0 if is_settled else settings.clamp,
+            "clamp_width": clamp_width,
             "mirror_age": settings.changing_history if self._follows_eye and not is_settled else -1.0,
             "pictures_of_frame": 1.0 + sample_index,
             "cut_share": settings.cut_share,
@@ -248,7 +250,8 @@ class Accumulator:
         self._context.memory_barrier()
 
     def counters(self) -> dict[str, float]:
-        """Share of the latest picture's surface pixels whose history is near by and seen alike: what tells a cut."""
+        """Share of the latest picture's surface pixels, one of each 2 x 2, whose history is near by and seen alike: what
+        tells a cut."""
         shown, near = np.frombuffer(self._counts.read(), np.uint32)
         return {"history_share": float(near) / max(float(shown), 1.0)}
 
