@@ -250,8 +250,8 @@ class Accumulator:
         self._context.memory_barrier()
 
     def counters(self) -> dict[str, float]:
-        """Share of the latest picture's surface pixels, one of each 2 x 2, whose history is near by and seen alike: what
-        tells a cut."""
+        """Share of the latest picture's surface pixels, one of each 2 x 2, whose history is near by and seen alike,
+        which tells a cut."""
         shown, near = np.frombuffer(self._counts.read(), np.uint32)
         return {"history_share": float(near) / max(float(shown), 1.0)}
 
