@@ -113,6 +113,35 @@ def first_hits(snapshot: SceneSnapshot, origins: Float64, directions: Float64, l
     return nearest
 
 
+BROKEN = (np.nan, np.inf, -np.inf, -1.0, 1e38, 0.0)
+
+
+def broken(values: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """float32 `values` with a hundredth of them replaced by what they should never be."""
+    spoiled = np.where(random.random(values.shape) < 0.01, random.choice(BROKEN, values.shape), values)
+    return spoiled.astype(np.float32)
+
+
+def broken_gbuffer(context: object, position: Float64, normal: Float64, random: np.random.Generator) -> GBuffer:
+    """Smooth metal of (h, w, 3) positions and normals, 900 deep, every texture broken here and there."""
+
+    def with_alpha(values: Float64, alpha: float | np.ndarray) -> object:
+        image = np.concatenate([values, np.broadcast_to(alpha, (*values.shape[:2], 1))], axis=2)
+        return upload(context, broken(image, random))
+
+    ones = np.ones_like(position)
+    textures = [
+        with_alpha(position, 900.0),
+        with_alpha(normal, random.uniform(0.0, 0.4, (*position.shape[:2], 1))),
+        with_alpha(normal, 1.0),
+        with_alpha(ones, 0.5),
+        with_alpha(0.0 * ones, 1.5),
+    ]
+    height, width = position.shape[:2]
+    ids = np.ones((height, width, 4), np.int32).tobytes()
+    return GBuffer(*textures, context.texture((width, height), 4, ids, dtype="i4"))  # type: ignore[arg-type, attr-defined]
+
+
 @dataclass(frozen=True)
 class Truth:
     """Of (n,) mirror rays. place: pixels from the lower left corner of where they hit something; on_screen: whether

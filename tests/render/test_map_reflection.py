@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.render.closed_rooms import inward_box
-from tests.render.mirror_rays import first_hits, upload
+from tests.render.mirror_rays import broken, broken_gbuffer, first_hits, upload
 from tests.render.rooms import camera_at, quad
 from vlm_addon.core.lamps import lamp_irradiance
 from vlm_addon.core.scene import (
@@ -233,3 +233,28 @@ def test_the_same_input_gives_the_same_bits(device: Device) -> None:
     assert (first >= 0.0).all()
     assert (first[..., 3] <= 1.0).all()
     assert first.any()
+
+
+def test_whatever_the_buffers_hold_the_result_is_sound(device: Device) -> None:
+    """Of the picture and of what is known; a map of each kind."""
+    snapshot = room([LAMPS["point"], LAMPS["spot"], LAMPS["sun"]], open_sides=[5])
+    found = reflected(device, snapshot)
+    assert snapshot.camera is not None
+    space = make_local_space(snapshot)
+    position = np.zeros((SIZE[1], SIZE[0], 3))
+    position[found.mirror] = space.local_points(found.origins)
+    normal = np.tile([0.0, 0.0, 1.0], (SIZE[1], SIZE[0], 1))
+    random = np.random.default_rng(3)
+    with device.current() as context:
+        maps = LampReflections(context, device.shaders, device.kept, snapshot, 64, 1)
+        gbuffer = broken_gbuffer(context, position, normal, random)
+        local = space.scene(snapshot)
+        view = make_view(local.camera, *SIZE, np.zeros(3))  # type: ignore[arg-type]
+        known = upload(context, broken(np.full((SIZE[1], SIZE[0], 4), 0.3), random))
+        reflection = MapReflectionPass(context, device.shaders, *SIZE)
+        settings = MapReflectionSettings()
+        image = read_image(reflection.render(gbuffer, view, maps.maps(), space, settings, 0, known))  # type: ignore[arg-type]
+    assert np.isfinite(image).all()
+    assert (image >= 0.0).all()
+    assert (image[..., 3] <= 1.0).all()
+    assert image.any()

@@ -14,6 +14,8 @@ from tests.render.mirror_rays import (
     MIRROR,
     SIZE,
     Reflected,
+    broken,
+    broken_gbuffer,
     mirror_scene,
     mirror_truth,
     reflected,
@@ -24,7 +26,6 @@ from vlm_addon.core import brdf
 from vlm_addon.core.scene import ORTHOGRAPHIC, Float64, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.passes.accumulate import read_image
-from vlm_addon.render.passes.gbuffer import GBuffer
 from vlm_addon.render.passes.screen_reflection import ReflectionSettings, ScreenReflectionPass
 
 NO_EDGE = ReflectionSettings(edge_fade=0.0)
@@ -249,32 +250,15 @@ def test_nothing_is_seen_in_an_empty_picture(device: Device) -> None:
     assert not reflected(device, mirror_scene(camera=away)).image.any()
 
 
-BROKEN = (np.nan, np.inf, -np.inf, -1.0, 1e38, 0.0)
-
-
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
 def test_whatever_the_buffers_hold_the_result_is_sound(device: Device, kind: str) -> None:
     """Every texture with a hundredth of its numbers broken."""
     random = np.random.default_rng(7)
-    camera = CAMERAS[kind]
-    base = reflected(device, mirror_scene(camera=camera))
-    width, height = SIZE
-
-    def broken(values: np.ndarray) -> np.ndarray:
-        spoiled = np.where(random.random(values.shape) < 0.01, random.choice(BROKEN, values.shape), values)
-        return spoiled.astype(np.float32)
-
-    position = np.concatenate([base.space.local_points(base.position), np.full((height, width, 1), 900.0)], axis=2)
-    normal = np.concatenate([base.normal, random.uniform(0.0, 0.4, (height, width, 1))], axis=2)
-    metallic = np.concatenate([base.normal, np.ones((height, width, 1))], axis=2)
-    material = np.concatenate([np.ones((height, width, 3)), np.full((height, width, 1), 0.5)], axis=2)
-    emission = np.concatenate([np.zeros((height, width, 3)), np.full((height, width, 1), 1.5)], axis=2)
+    base = reflected(device, mirror_scene(camera=CAMERAS[kind]))
     with device.current() as context:
-        textures = [upload(context, broken(image)) for image in (position, normal, metallic, material, emission)]
-        ids = context.texture(SIZE, 4, np.ones((height, width, 4), np.int32).tobytes(), dtype="i4")
-        gbuffer = GBuffer(*textures, ids)  # type: ignore[arg-type]
-        lit = upload(context, broken(np.ones((height, width, 4))))
-        reflection = ScreenReflectionPass(context, device.shaders, width, height, ReflectionSettings())
+        gbuffer = broken_gbuffer(context, base.space.local_points(base.position), base.normal, random)
+        lit = upload(context, broken(np.ones((SIZE[1], SIZE[0], 4)), random))
+        reflection = ScreenReflectionPass(context, device.shaders, *SIZE, ReflectionSettings())
         image = read_image(reflection.render(gbuffer, base.view, lit, 0))  # type: ignore[arg-type]
         hits = read_image(reflection.hits)
     assert np.isfinite(image).all()
