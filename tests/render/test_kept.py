@@ -56,6 +56,15 @@ def test_what_a_finished_frame_did_not_ask_for_is_let_go_of() -> None:
     assert kept.events() == {"map": Reuse(1, 1)}
 
 
+def test_a_frame_that_is_not_whole_lets_go_of_nothing() -> None:
+    kept = Kept()
+    for is_whole in (True, False, True):
+        with kept.frame(is_whole):
+            if is_whole:
+                kept.several("map", "1", one)
+    assert kept.events() == {"map": Reuse(0, 1)}
+
+
 def test_a_frame_that_failed_lets_go_of_nothing() -> None:
     kept = Kept()
     with kept.frame():

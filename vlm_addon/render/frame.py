@@ -61,7 +61,7 @@ def render_frame(
 ) -> Frame:
     """The picture of `snapshot`. Raises InvalidInput for what cannot be rendered, Cancelled when asked to stop."""
     kept = device.kept if settings.economical else Kept()
-    with kept.frame():
+    with kept.frame(is_whole=not settings.plan_only):
         return _render(_Stage(device, settings, kept, progress), snapshot, light_mesh)
 
 

@@ -55,13 +55,14 @@ class Kept:
         self.frame_index = 0
 
     @contextmanager
-    def frame(self) -> Iterator[None]:
+    def frame(self, is_whole: bool = True) -> Iterator[None]:
         """One frame: `events` begin anew with it. What `several` was not asked for in a frame that came to its end is
-        let go of then."""
+        let go of then, unless the frame is not whole and so does not ask for all that the next one needs."""
         self._begin()
         with self.digests.remembered():
             yield
-        self._end()
+        if is_whole:
+            self._end()
 
     def get(self, kind: str, key: str, make: Callable[[], T]) -> T:
         """What `make` made last time for this kind if that had the same key, else what it makes now: the latest of each
