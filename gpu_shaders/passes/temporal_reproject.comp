@@ -14,7 +14,8 @@ layout(binding = HISTORY_PLACE_UNIT) uniform sampler2D history_place;   // its o
 layout(binding = HISTORY_NORMAL_UNIT) uniform sampler2D history_normal;
 layout(rgba32f, binding = 0) writeonly uniform image2D reprojected;
 #ifdef ACCUMULATES
-layout(rg32f, binding = 1) writeonly uniform image2D age;               // and deviation of what pictures found
+// And deviation of what pictures found; z, w: motion, pixels to the right and up to where the surface was.
+layout(rgba32f, binding = 1) writeonly uniform image2D age;
 #else
 layout(r32f, binding = 1) writeonly uniform image2D age;                // pictures in the mean; 0 where there is none
 #endif
@@ -60,11 +61,12 @@ bool is_of_surface(ivec2 texel, vec3 p, vec3 n, vec3 plane, float reach) {
 }
 
 // pictures: in the mean, 0 for no history. is_near: whether that is near by in the picture and seen alike. deviation: of
-// what pictures found.
-vec4 history_of(ivec2 pixel, out float pictures, out bool is_near, out float deviation) {
+// what pictures found. motion: pixels to where the surface was in that picture, 0 where that is not known.
+vec4 history_of(ivec2 pixel, out float pictures, out bool is_near, out float deviation, out vec2 motion) {
     pictures = 0.0;
     is_near = false;
     deviation = 0.0;
+    motion = vec2(0.0);
 #ifdef HAS_MOTION
     vec4 before = texelFetch(place_before, pixel, 0);
     if (before.w == 0.0) {
@@ -86,6 +88,7 @@ vec4 history_of(ivec2 pixel, out float pictures, out bool is_near, out float dev
         return vec4(0.0);
     }
 #ifdef ACCUMULATES
+    motion = place - vec2(pixel);
     float depth = texelFetch(gbuffer_position, pixel, 0).w;
     float pixel_now = history_scale * (now_pixel_at_0 + now_pixel_per_depth * depth);
     vec3 to_now = normalize(eye_now.xyz - eye_now.w * texelFetch(gbuffer_position, pixel, 0).xyz);
@@ -94,7 +97,7 @@ vec4 history_of(ivec2 pixel, out float pictures, out bool is_near, out float dev
     if (pixel_at_0 + pixel_per_depth * clip.w > MOST_MAGNIFIED * pixel_now || (follows_eye && !is_alike)) {
         return vec4(0.0);
     }
-    is_near = is_alike && length(place - vec2(pixel)) < LONGEST_WAY * float(size.x);
+    is_near = is_alike && length(motion) < LONGEST_WAY * float(size.x);
 #endif
     vec2 within = fract(place + SAME_PIXEL);
     ivec2 corner = ivec2(floor(place + SAME_PIXEL));
@@ -146,9 +149,10 @@ void main() {
     float pictures = 0.0;
     bool is_near = false;
     float deviation = 0.0;
+    vec2 motion = vec2(0.0);
     vec4 found = vec4(0.0);
     if (most_age > 0.0 && pixel_shows_geometry(pixel)) {
-        found = history_of(pixel, pictures, is_near, deviation);
+        found = history_of(pixel, pictures, is_near, deviation, motion);
     }
 #ifdef ACCUMULATES
     // One pixel of each 2 x 2 tells the share as well.
@@ -158,5 +162,5 @@ void main() {
     }
 #endif
     imageStore(reprojected, pixel, found);
-    imageStore(age, pixel, vec4(pictures, deviation, 0.0, 0.0));
+    imageStore(age, pixel, vec4(pictures, deviation, motion));
 }

@@ -28,7 +28,7 @@ WIDTH, HEIGHT = 48, 36
 class Picture:
     """(h, w, …), row 0 at the top. places: m in world space. shown: whether a surface is. faces: their numbers. mean:
     RGBA, what is shown. age: pictures in the mean that is kept. before: where surfaces were, m in world space, and
-    normal, plane then; None where nothing moved; known: whether they were."""
+    normal, plane then; None where nothing moved; known: whether they were. vectors: pixels right and up to there."""
 
     places: Float64
     shown: np.ndarray
@@ -42,6 +42,7 @@ class Picture:
     known: np.ndarray | None
     normal_before: Float32 | None
     plane_before: Float32 | None
+    vectors: Float32
 
 
 Found = Callable[[Float64, np.ndarray], np.ndarray]
@@ -114,6 +115,7 @@ class PictureSequence:
                 None if before is None else before[..., 3] == 1.0,
                 None if surfaces is None else read_half(surfaces.normal),
                 None if surfaces is None else read_half(surfaces.plane),
+                accumulator.images()["motion"],
             )
 
 

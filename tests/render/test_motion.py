@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.render.picture_sequence import PictureSequence, looking_down_y, moved
+from tests.render.picture_sequence import WIDTH, PictureSequence, looking_down_y, moved
 from tests.render.rooms import box_room, quad
-from vlm_addon.core.scene import ORTHOGRAPHIC, Float64, Mesh, SceneSnapshot
+from vlm_addon.core.scene import ORTHOGRAPHIC, Camera, Float64, Mesh, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.local_space import LocalSpace
 from vlm_addon.render.mesh_motion import MeshMove, MeshPlaces
@@ -125,6 +125,32 @@ def test_a_deforming_mesh_leads_back_to_where_its_triangles_were(device: Device,
     assert picture.before is not None
     wanted = carried(picture.places[on_sheet], picture.faces[on_sheet] - ROOM_FACES, other, one)
     assert_found(picture.before[on_sheet], wanted, pixel_size(picture.places, on_sheet))
+
+
+@pytest.mark.parametrize("kind", ["PERSPECTIVE", ORTHOGRAPHIC])
+def test_vectors_lead_to_where_the_picture_before_saw_it(device: Device, kind: str) -> None:
+    """Camera and sheet move; jitter is no motion. Pixels of a camera by hand."""
+    sequence, sheet = PictureSequence(device), grid()
+    turn = turn_about_y(0.2)
+    turned = moved(sheet, (sheet.positions - MIDDLE) @ turn.T + MIDDLE)
+    first = looking_down_y(kind=kind, ortho_scale=3.0)
+    sequence.picture(room_with(sheet), camera=first, jitter=(0.3, -0.4))
+    second = looking_down_y((1.1, -2.9, 1.05), kind=kind, ortho_scale=3.0)
+    picture = sequence.picture(room_with(turned), camera=second, jitter=(-0.2, 0.1))
+
+    def pixels(points: Float64, camera: Camera) -> Float64:
+        right, up, backward, eye = (camera.matrix_world[:3, i] for i in range(4))
+        away = points - eye
+        depth = 1.0 if kind == ORTHOGRAPHIC else -(away @ backward)[..., None]
+        scale = WIDTH / (3.0 if kind == ORTHOGRAPHIC else 36.0 / 35.0)
+        return np.stack([away @ right, away @ up], axis=-1) / depth * scale
+
+    on_sheet = picture.shown & (picture.faces >= ROOM_FACES)
+    came_from = np.where(on_sheet[..., None], (picture.places - MIDDLE) @ turn + MIDDLE, picture.places)
+    wanted = pixels(came_from, first) - pixels(picture.places, second)
+    inside = picture.shown & (picture.vectors != 0.0).all(axis=2)
+    assert inside.sum() > 0.9 * picture.shown.sum()
+    np.testing.assert_allclose(picture.vectors[inside], wanted[inside], atol=0.02)
 
 
 def test_scenes_of_any_size_and_place(device: Device) -> None:

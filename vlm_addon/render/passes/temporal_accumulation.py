@@ -122,7 +122,7 @@ class Accumulator:
             histories[size] = AccumulatedHistory(context, width, height)
         self._history = histories[size]
         self._reprojected, self._result = (context.texture(size, 4, dtype="f4") for _ in range(2))
-        self._age = context.texture(size, 2, dtype="f4")
+        self._age = context.texture(size, 4, dtype="f4")
         self._counts = context.buffer(bytes(8))
         self._groups = -(-width // GROUP_SIDE), -(-height // GROUP_SIDE)
         self._defines = {
@@ -256,8 +256,14 @@ class Accumulator:
         return {"history_share": float(near) / max(float(shown), 1.0)}
 
     def images(self) -> dict[str, Float32]:
-        """`history_age` of the last picture, (h, w, 1), row 0 at the top: how many pictures are in the mean."""
-        return {"history_age": np.ascontiguousarray(read_image(self._history.place)[..., 3:])}
+        """Of the last picture, row 0 at the top: `history_age`, (h, w, 1), how many pictures are in the mean; `motion`,
+        (h, w, 2), pixels to the right and up to where each surface was in the picture before, 0 where that is unknown
+        or out of it."""
+        age, found = read_image(self._history.place), read_image(self._age)
+        return {
+            "history_age": np.ascontiguousarray(age[..., 3:]),
+            "motion": np.ascontiguousarray(found[..., 2:]),
+        }
 
 
 def is_same_eye(view: View, space: LocalSpace, other: View, other_space: LocalSpace, size: tuple[int, int]) -> bool:
