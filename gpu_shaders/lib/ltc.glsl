@@ -13,7 +13,7 @@
 // Squared sizes in the lobe's space up to which a few points of a light stand for it, and from which on they do not.
 #define LTC_POINT_SIZES vec2(0.1, 0.6)
 // Squared size up to which its centroid does alone.
-#define LTC_ONE_POINT_SIZE 0.004
+#define LTC_ONE_POINT_SIZE 0.02
 // Share of a white wall's light that is left out.
 #define LTC_LEAST_LOBE 2e-4
 // Most by which the true lobe is taken to exceed the fitted one.

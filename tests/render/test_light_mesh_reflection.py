@@ -55,6 +55,29 @@ def test_a_wall_of_light_over_a_floor(device: Device, roughness: float, most: fl
     assert relative_rmse(reflection(device, pixels, lights, radiosity)[..., :3], truth) < most
 
 
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.7])
+def test_how_a_tile_sorts_its_lights_does_not_show(device: Device, roughness: float) -> None:
+    """A floor in its order, whose tiles find simple ways for most lights and none for some, against the same points in
+    disorder, whose tiles can tell nothing."""
+    generator = np.random.default_rng(13)
+    side, count = 48, 300
+    pixels, lights = GlossyPixels(generator, (side, side), roughness), random_lights(generator, count, 0.05, 1.5)
+    lights.vertices[:, 2] += 1.2
+    pixels.shown[:], pixels.color[:] = True, 1.0
+    x, y = np.meshgrid(np.linspace(-0.8, 0.8, side), np.linspace(-1.2, 1.2, side))
+    pixels.positions[:] = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    pixels.normals[:], pixels.tag_ids[:] = (0.0, 0.0, 1.0), 0
+    pixels.camera = camera_at((0.0, -2.5, 1.2), (0.0, 0.0, 0.0))
+    radiosity = generator.uniform(0.0, 10.0, (count, 3)).astype(np.float32)
+    ordered = reflection(device, pixels, lights, radiosity).reshape(-1, 4)
+    order = generator.permutation(side * side)
+    pixels.positions = pixels.positions.reshape(-1, 3)[order].reshape(side, side, 3)
+    disordered = np.empty_like(ordered)
+    disordered[order] = reflection(device, pixels, lights, radiosity).reshape(-1, 4)
+    assert np.abs(ordered - disordered).max() < 2e-3 * ordered.max()
+    assert np.abs(ordered - disordered).mean() < 1e-3 * ordered.mean()
+
+
 @pytest.mark.parametrize("roughness", [0.05, 0.2, 0.5, 1.0])
 def test_a_closed_room_of_white_light_is_seen_whole_in_white_metal(device: Device, roughness: float) -> None:
     """All of the lobe ends on lights of radiance 1, however many: what comes back is the gain times the albedo, 1."""
