@@ -9,6 +9,7 @@ the effect, the one with which that is least: what the effect has to beat to kno
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from vlm_addon.blender.cycles_reference import render_reference
 from vlm_addon.blender.light_mesh_io import Extraction
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.scene import Float32
+from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
 from vlm_addon.terminal import table
@@ -26,6 +28,8 @@ TECHNIQUES = ("vlm", "rsm_gather")
 RADII = (0.02, 0.05, 0.1, 0.2)
 """Of the scene's diagonal."""
 PICTURES = 8
+LIGHTS = 1000
+"""Of the light mesh that is made where a scene has none."""
 
 
 def main() -> None:
@@ -39,13 +43,14 @@ def main() -> None:
     rows: list[tuple[str, ...]] = []
     for scene in options.scenes:
         found = open_sample(scene)
+        if found.light_mesh is None:
+            made = create_light_mesh(found.snapshot.meshes, SimplifySettings(target_triangles=LIGHTS))
+            found = replace(found, light_mesh=made.light_mesh)
         with quiet():
             reference = render_reference(options.size, options.size, 1, options.reference_samples)
         truth = reference.images["indirect"]
         with Device() as device:
             for technique in options.techniques:
-                if technique == "vlm" and found.light_mesh is None:
-                    continue
                 rows += _rows(device, found, technique, options.size, truth, scene)
         rows.append((scene, "noise of the reference", "", f"{reference.noise['indirect']:.1%}", ""))
     print(table(("scene", "technique", "radius", "error", "light"), rows))
