@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.render.rooms import box_room, lights_from_triangles, quad
+from tests.render.rooms import box_room, camera_at, lights_from_triangles, quad
 from vlm_addon.core import lamps
 from vlm_addon.core.scene import AREA, POINT, SPOT, SUN, Light, SceneSnapshot
-from vlm_addon.render.local_space import GRAIN, HALF_DIAGONAL, make_local_space
+from vlm_addon.render.local_space import GRAIN, HALF_DIAGONAL, is_fine_enough, make_local_space, make_still_space
 
 LIGHTS = {
     POINT: Light("lamp", POINT, (5.0, 6.0, 7.0), (1.0, 2.0, 3.0), radius=0.3),
@@ -103,3 +103,18 @@ def test_a_scene_without_extent_is_in_metres(meshes: tuple) -> None:
     space = make_local_space(replace(box_room(), meshes=meshes))
     assert space.unit == 1.0
     assert np.isfinite(space.origin).all()
+
+
+@pytest.mark.parametrize(
+    ("size", "clip_start", "enough"),
+    [(5.0, 0.1, True), (30.0, 0.1, True), (2000.0, 0.1, False), (2000.0, 5.0, True), (5.0, 1e-4, False)],
+)
+def test_a_space_that_no_camera_moves_has_digits_for_rooms(size: float, clip_start: float, enough: bool) -> None:
+    low, high = np.zeros(3), np.full(3, size)
+    still = make_still_space(low, high)
+    camera = camera_at((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), clip_start=clip_start)
+    assert is_fine_enough(still, camera) == enough
+    # What it stands for: a step of float32 at the scene's far end, on a thing right before the camera.
+    step = float(np.spacing(np.float32(still.local_points(high).max()))) * still.unit
+    left, right, _, _ = camera.frame(1, 1)
+    assert (step < 2e-3 * clip_start * (right - left)) or not enough

@@ -25,7 +25,7 @@ from .frame_types import Frame, RenderSettings, require_in_range
 from .kept import Kept
 from .kept_geometry import kept_geometry
 from .lamp_shadows import LampShadows, StillLamps
-from .local_space import LocalSpace, make_local_space
+from .local_space import LocalSpace, is_fine_enough, make_local_space, make_still_space
 from .passes.accumulate import AccumulatePass, PictureLight, jitter_offsets
 from .passes.direct_light import DirectLightPass
 from .passes.gbuffer import GBufferPass
@@ -96,7 +96,12 @@ def _render(stage: _Stage, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh
     step(progress, 0.0, "geometry")
     with timer.measure("geometry"):
         geometry = kept_geometry(context, stage.kept, lit, space)
-    still = StillLamps(ShadowCasters(context, stage.kept, lit, planner.occluders), stage.kept, lit.lights, space)
+    still = StillLamps(
+        ShadowCasters(context, stage.kept, lit, planner.occluders, _caster_space(lit, space)),
+        stage.kept,
+        lit.lights,
+        space,
+    )
     cast = _casting(local.lights, plan)
     shadows = LampShadows(context, shaders, geometry, cast, settings.shadow_resolution, still)
     # A sun is the same in every space.
@@ -230,6 +235,13 @@ def _world_lights(stage: _Stage, snapshot: SceneSnapshot) -> tuple[tuple[Light, 
     lights = kept_lights("world_lights", settings.world_lights)
     direct_count = direct_world_lights(settings.world_lights, settings.samples)
     return lights, kept_lights("direct_world_lights", direct_count)
+
+
+def _caster_space(world: SceneSnapshot, space: LocalSpace) -> LocalSpace:
+    """Where shadow maps are drawn: where no camera moves them, if that has digits enough, else in the frame's space."""
+    still = make_still_space(*world.bounds())
+    assert world.camera is not None
+    return still if is_fine_enough(still, world.camera) else space
 
 
 def _plan_defines(plan: EffectPlan) -> dict[str, int | float | bool | str]:

@@ -13,13 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.light_mesh import VirtualLightMesh
-from ..core.scene import SUN, Camera, Float32, Float64, Light, SceneSnapshot
+from ..core.scene import ORTHOGRAPHIC, SUN, Camera, Float32, Float64, Light, SceneSnapshot
 
 HALF_DIAGONAL = 1024.0
 """Of every scene's visible bounds, in local units: fourth powers of a scene's length and of a millionth of it are
 both far from the ends of float32."""
 GRAIN = 0.25
 """The origin moves in steps of this many local units, so that a small move of the camera rounds nothing anew."""
+FLOAT32_STEP = 2.0**-23
+FINEST_SHARE = 2.0**-12
+"""Of the width of the nearest thing that a camera can see whole: a quarter of a pixel of a picture of a thousand."""
 STILL_GRAIN = 128.0
 """The same of the space that no camera moves: so that an object which widens the scene a little moves nothing else."""
 
@@ -114,6 +117,15 @@ def make_still_space(low: Float64, high: Float64) -> LocalSpace:
         return LocalSpace(np.where(np.isfinite(middle), middle, 0.0), 1.0)
     unit = 2.0 ** math.ceil(math.log2(half_diagonal / HALF_DIAGONAL))
     return LocalSpace(np.round(middle / (STILL_GRAIN * unit)) * (STILL_GRAIN * unit), unit)
+
+
+def is_fine_enough(still: LocalSpace, camera: Camera) -> bool:
+    """Whether what float32 leaves of a place in `still` is too small to be seen by a camera, (world space, usable),
+    however near something is. Otherwise only a space near the camera will do, as in a scene that is a kilometre wide
+    and is seen from a hand's breadth."""
+    left, right, _, _ = camera.frame(1, 1)
+    nearest = 1.0 if camera.kind == ORTHOGRAPHIC else camera.clip_start
+    return HALF_DIAGONAL * FLOAT32_STEP * still.unit <= FINEST_SHARE * nearest * (right - left)
 
 
 def _half_diagonal(low: Float64, high: Float64) -> tuple[float, bool]:

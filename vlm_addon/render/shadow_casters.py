@@ -17,7 +17,7 @@ from ..core.reach import Bools, box_corners, in_reach
 from ..core.scene import NO_TEXTURE, Light, Material, Mesh, SceneSnapshot
 from .geometry import GpuGeometry
 from .kept import Kept
-from .local_space import make_still_space
+from .local_space import LocalSpace, make_still_space
 from .shadow_windows import Bounds
 
 if TYPE_CHECKING:
@@ -36,14 +36,15 @@ class ShadowCasters:
         kept: Kept,
         world: SceneSnapshot,
         occluders: Sequence[Bools] | None = None,
+        space: LocalSpace | None = None,
     ) -> None:
         """world: the snapshot in world space. occluders: which triangles of each mesh may stand before another; None
-        for all."""
+        for all. space: another one than that which no camera moves."""
         casting = world.meshes if occluders is None else map(_part, world.meshes, occluders)
         meshes = tuple(mesh for mesh in casting if len(mesh.triangles))
         materials = world.materials or (Material("default"),)
         bounds = world.bounds()
-        self.space = make_still_space(*bounds)
+        self.space = make_still_space(*bounds) if space is None else space
         self.low, self.high = (self.space.local_points(corner) for corner in bounds)
         self.triangle_count = sum(len(mesh.triangles) for mesh in meshes)
         self._context, self._kept = context, kept
