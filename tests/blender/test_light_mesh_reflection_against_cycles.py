@@ -36,7 +36,7 @@ def principled(name, **values):
     return material, node
 
 
-def build(make_mesh, distribution, **values):
+def build(make_mesh, distribution, corners, height, **values):
     """The scene; returns its camera as extracted."""
     floor, node = principled("floor", **values)
     node.distribution = distribution
@@ -45,10 +45,10 @@ def build(make_mesh, distribution, **values):
         "glow", **{"Base Color": (0, 0, 0, 1), "Specular IOR Level": 0.0, "Emission Strength": RADIANCE}
     )
     glow.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1, 1, 1, 1)
-    make_mesh("glow", CORNERS, [(0, 1, 2, 3)], material=glow)
+    make_mesh("glow", corners, [(0, 1, 2, 3)], material=glow)
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     bpy.context.scene.collection.objects.link(camera)
-    camera.location = (0.3, -3.5, 1.8)
+    camera.location = (0.3, -3.5, height)
     camera.data.lens = 60.0
     camera.rotation_euler = (Vector((0.0, -0.4, 0.0)) - camera.location).to_track_quat("-Z", "Y").to_euler()
     bpy.context.scene.camera = camera
@@ -73,17 +73,16 @@ def floor_pixels(camera, roughness, metallic, color):
     return pixels, -(rays / np.linalg.norm(rays, axis=-1, keepdims=True))[..., 2]
 
 
-def rival_pictures(device, make_mesh, distribution, roughness, metallic, samples):
+def rival_pictures(device, make_mesh, distribution, roughness, metallic, samples, corners=CORNERS, height=1.8):
     """(n,) radiance of the floor's pixels by us and by Cycles, and their cosines of the eye."""
     color = (1, 1, 1, 1) if metallic else (0, 0, 0, 1)
     values = {"Base Color": color, "Roughness": roughness, "Metallic": float(metallic), "IOR": 1.5}
-    camera = build(make_mesh, distribution, **values)
+    camera = build(make_mesh, distribution, corners, height, **values)
     pixels, cosines = floor_pixels(camera, roughness, metallic, color[:3])
     cycles = render_reference(WIDTH, HEIGHT, 0, samples, at_centres=True).images["combined"][..., 0]
-    corners = np.array(CORNERS, np.float32)
+    corners = np.array(corners, np.float32)
     lights = lights_from_triangles(np.stack([corners[[0, 2, 1]], corners[[0, 3, 2]]]))
-    behind = [0.0, -2.0, 0.5] - corners.mean(axis=0)
-    assert (lights.area_vectors @ behind > 0.0).all()
+    assert (lights.area_vectors @ ([0.0, -2.0, 0.0] - corners.mean(axis=0)) > 0.0).all()
     ours = reflection(device, pixels, lights, np.full((2, 3), RADIANCE * np.pi, np.float32))[..., 0]
     return ours[pixels.shown], cycles[pixels.shown], cosines[pixels.shown]
 
