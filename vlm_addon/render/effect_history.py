@@ -25,9 +25,12 @@ class EffectHistory:
         self._motion_pass = MotionPass(scene.context, scene.shaders, scene.kept, scene.world, scene.space, *size)
         self._motion: tuple[int, Motion] | None = None
         self._accumulators: dict[str, Accumulator] = {}
-        world = scene.world
-        lights = (world.lights, world.materials, scene.world_lights, world.world_radiance)
-        self._lights_key = scene.kept.digests.of(*lights)
+        world, frame = scene.world, scene.settings
+        self._lights_key = scene.kept.digests.of(
+            (world.lights, world.materials, world.textures, world.world_radiance, world.environment),
+            scene.world_lights,
+            (frame.technique, frame.technique_settings, frame.effects, frame.shadow_resolution, frame.shadow_samples),
+        )
 
     def picture(self, name: str, *, follows_eye: bool) -> int:
         """The number of the picture, over frames, that the effect is about to look at: what its noise is made from.
@@ -58,5 +61,10 @@ class EffectHistory:
             )
 
     def images(self) -> dict[str, Float32]:
-        """How many pictures are in the mean of each pixel, by effect."""
-        return {f"{name}_history_age": each.images()["history_age"] for name, each in self._accumulators.items()}
+        """How many pictures are in the mean of each pixel, by effect, and where in the last picture its surface was:
+        pixels right and up."""
+        found: dict[str, Float32] = {}
+        for name, each in self._accumulators.items():
+            images = each.images()
+            found |= {f"{name}_history_age": images["history_age"], "motion": images["motion"]}
+        return found
