@@ -65,6 +65,6 @@ def test_noise_of_occlusion_goes_down_over_frames(kind: str) -> None:
 def test_a_first_frame_is_that_without_accumulation_to_the_bit(samples: int) -> None:
     plain = last_frame("rest", samples, accumulates=False, frames=1)
     first = last_frame("rest", samples, accumulates=True, frames=1)
-    assert set(first.images) - set(plain.images) == {"ambient_occlusion_history_age"}
+    assert set(first.images) - set(plain.images) == {"ambient_occlusion_history_age", "motion"}
     for name, image in plain.images.items():
         np.testing.assert_array_equal(first.images[name], image, err_msg=name)
