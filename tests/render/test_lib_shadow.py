@@ -247,3 +247,39 @@ def test_cone_looks_down_and_a_sun_up(device: Device) -> None:
     position, normal, _ = in_face(device, "SHADOW_PARALLEL", offsets, normals)
     np.testing.assert_array_equal(position, offsets)
     np.testing.assert_array_equal(normal, normals)
+
+
+def test_place_is_that_of_the_point_which_lies_there(device: Device) -> None:
+    random = np.random.default_rng(5)
+    offsets = random.integers(-4096, 4096, (100, 3)) / 1024.0
+    for kind in ("SHADOW_CUBE", "SHADOW_CONE", "SHADOW_PARALLEL"):
+        record = lamp(kind, (1.5, -2.0, 0.25))
+        inputs, text = with_lamp(record, len(offsets))
+        inputs |= {"offset": offsets, "p": offsets + record["shadow_origin"], "n": np.broadcast_to(UP, offsets.shape)}
+        for call in ("shadow_place({}, offset, n)", "shadow_point({}, p, n)"):
+            found = evaluate(device, "lib/shadow.glsl", f"{call.format(text)}.position", inputs, 3)
+            if "place" in call:
+                expected = found
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("kind", ["SHADOW_CUBE", "SHADOW_CONE", "SHADOW_PARALLEL"])
+def test_a_map_in_other_units_from_an_origin_in_two_parts_shadows_the_same(device: Device, kind: str) -> None:
+    """Units of a power of two and places on a grid: to the bit."""
+    random = np.random.default_rng(6)
+    points = random.integers(-1024, 1024, (400, 3)) / 1024.0
+    record, units = lamp(kind), 4.0
+    record["shadow_rounding"] = 1e-3
+    is_parallel = kind == "SHADOW_PARALLEL"
+    texels = random.uniform(-1.0, 1.0, shape(kind)) if is_parallel else NEAR * random.uniform(0.3, 1.0, shape(kind))
+    other = record.copy()
+    other["shadow_scale"] = units
+    other["shadow_origin"] -= 0.25
+    other["shadow_origin_rest"] = 0.25
+    other["shadow_rounding"] *= units
+    lengths = ("shadow_extent", "shadow_centre") if is_parallel else ("shadow_near",)
+    for name in lengths:
+        other[name] *= units
+    found = share(device, record, texels, points)
+    assert 0.05 < found.mean() < 0.95
+    np.testing.assert_array_equal(share(device, other, units * texels if is_parallel else texels, points), found)

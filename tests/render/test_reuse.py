@@ -211,6 +211,7 @@ EDITS: dict[str, Callable[[SceneSnapshot], SceneSnapshot]] = {
     "nothing": lambda s: s,
     "camera": lambda s: replace(s, camera=MOVED_CAMERA),
     "lamp moves": lambda s: replace(s, lights=(replace(KEY, position=(-1.0, 0.0, 2.0)), *s.lights[1:])),
+    "bulb moves": lambda s: replace(s, lights=(s.lights[0], replace(BULB, position=(0.5, -1.0, 1.8)), *s.lights[2:])),
     "lamp goes": lambda s: replace(s, lights=s.lights[:1] + s.lights[2:]),
     "lamps trade places": lambda s: replace(s, lights=s.lights[::-1]),
     "block moves": lambda s: replace(s, meshes=(*s.meshes[:3], *block((-1.0, 0.0)))),
