@@ -164,9 +164,9 @@ def main():
         group, effects = bpy.context.scene.vlm.vlm_settings, bpy.context.scene.vlm.effects
         group.lights, group.range = "range", 0.0
         # Glossy surfaces show all virtual lights, whatever the diffuse sum leaves out.
-        effects.screen_reflection = effects.light_mesh_reflection = "off"
+        effects.screen_reflection = effects.light_mesh_reflection = effects.map_reflection = "off"
         dropped = picture("dropped", "VLM_ENGINE")
-        effects.screen_reflection = effects.light_mesh_reflection = "auto"
+        effects.screen_reflection = effects.light_mesh_reflection = effects.map_reflection = "auto"
         group.lights = "tolerance"
         return float(dropped[..., :3].mean())
 
