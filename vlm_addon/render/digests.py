@@ -16,6 +16,8 @@ import numpy as np
 
 CHUNK_BYTES = 1 << 22
 """Arrays are hashed in pieces of this size, side by side: hashlib lets other threads run meanwhile."""
+LARGE_BYTES = 1 << 18
+"""Of an array that is worth handing to another thread."""
 MOST_THREADS = 8
 
 
@@ -46,7 +48,8 @@ class Digests:
         """Hashes the large arrays in `values` side by side where they will be remembered."""
         if self._remembered is None:
             return
-        missing = {id(array): array for array in _arrays(values) if id(array) not in self._remembered}
+        large = {id(array): array for array in _arrays(values) if array.nbytes >= LARGE_BYTES}
+        missing = {key: array for key, array in large.items() if key not in self._remembered}
         if sum(array.nbytes for array in missing.values()) < CHUNK_BYTES:
             return
         pieces = [(key, piece) for key, array in missing.items() for piece in _pieces(array)]

@@ -67,7 +67,7 @@ def _buffer_keys(digests: Digests, world: SceneSnapshot, space: LocalSpace) -> d
     """Of each buffer and texture by the name that GpuGeometry gives it: a hash of all that it depends on."""
     meshes = [mesh for mesh in world.meshes if len(mesh.triangles)]
     materials = [replace(material, name="") for material in world.materials or (Material("default"),)]
-    order = [[mesh.material_indices for mesh in meshes], [batch_key(material) for material in materials]]
+    order = digests.of([mesh.material_indices for mesh in meshes], [batch_key(material) for material in materials])
     keys = {
         name: digests.of(
             order, [[getattr(mesh, field) for field in fields] for mesh in meshes], space if is_placed else ""
