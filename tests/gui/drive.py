@@ -61,6 +61,14 @@ def look(name):
     STORY["seen"].append(name)
 
 
+def effects_tab():
+    """A tab that holds the panel Effects alone, opened: Blender remembers that the panel itself begins closed."""
+    panel = bpy.types.VLM_PT_effects
+    members = {"bl_label": panel.bl_label, "draw": panel.draw, "bl_category": "VLM Effects", "bl_options": set()}
+    bpy.utils.register_class(type("VLM_PT_effects_alone", panel.__bases__, members))
+    return members["bl_category"]
+
+
 def until(condition):
     """Yields until `condition` holds; raises after the longest wait."""
     start = time.monotonic()
@@ -199,6 +207,15 @@ def story():
     yield SECONDS_FOR_REDRAW
     look("7_rendered_view")
     area.spaces.active.shading.type = "SOLID"
+
+    effects = effects_tab()
+    redraw()
+    yield SECONDS_FOR_REDRAW
+    next(region for region in area.regions if region.type == "UI").active_panel_category = effects
+    redraw()
+    yield SECONDS_FOR_REDRAW
+    look("7_effects")
+    bpy.utils.unregister_class(bpy.types.VLM_PT_effects_alone)
 
     eevee_picture("eevee_with")
     for name in light_meshes():

@@ -20,6 +20,7 @@ from .properties import effect_property, shown_settings, technique_group
 CATEGORY = "VLM"
 PIXELS_PER_CHARACTER = 7
 LABEL_SHARE = 0.38
+EFFECT_LABEL_SHARE = 0.62
 FINDINGS_SHOWN = 8
 
 
@@ -107,7 +108,7 @@ class VLM_PT_effects(_SidebarPanel, bpy.types.Panel):  # noqa: N801
         for rule in RULES:
             choice = getattr(group, rule.name)
             column = self.layout.column(align=True)
-            _labelled(column, group, rule.name)
+            _labelled(column, group, rule.name, EFFECT_LABEL_SHARE)
             settings_type = EFFECT_SETTINGS.get(rule.name)
             for info in describe(settings_type) if settings_type is not None and choice != OFF else ():
                 column.prop(group, effect_property(rule.name, info.name))
@@ -123,9 +124,9 @@ def _technique_settings(layout: Any, scene: Any) -> None:
             layout.prop(group, name)
 
 
-def _labelled(layout: Any, owner: Any, name: str) -> None:
+def _labelled(layout: Any, owner: Any, name: str, label_share: float = LABEL_SHARE) -> None:
     # a plain menu in a narrow sidebar cuts its label off
-    split = layout.split(factor=LABEL_SHARE)
+    split = layout.split(factor=label_share)
     split.label(text=owner.bl_rna.properties[name].name)
     split.prop(owner, name, text="")
 
