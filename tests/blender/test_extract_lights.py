@@ -230,3 +230,13 @@ def test_an_even_world_has_the_radiance_of_its_node(scene, make_plane, make_came
     assert snapshot.world_radiance == pytest.approx(render_reference(2, 2, 0, 2).images["combined"][0, 0])
     assert snapshot.environment is None
     assert snapshot.findings == ()
+
+
+def test_negative_light_counts_as_none_and_is_told(make_plane, make_light):
+    make_plane()
+    lamp = make_light("POINT", -12.0, (1.0, 2.0, 3.0))
+    snapshot = extract_scene()
+    assert [light.power for light in snapshot.lights] == [(0.0, 0.0, 0.0)]
+    (finding,) = snapshot.findings
+    assert lamp.name in finding.subject
+    assert "-12" in finding.problem

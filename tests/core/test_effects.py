@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rooms import lights_from_triangles, quad
 from vlm_addon.core.effect_rules import RULES
 from vlm_addon.core.effects import (
     AUTO,
@@ -26,6 +27,7 @@ from vlm_addon.core.effects import (
 )
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.occluders import Occlusion
+from vlm_addon.core.scene import AREA, Light, SceneSnapshot
 from vlm_addon.core.scene_facts import (
     NO_SPECULAR,
     OWN_SPECULAR,
@@ -34,12 +36,13 @@ from vlm_addon.core.scene_facts import (
     SceneFacts,
     ScreenFacts,
     TechniqueFacts,
+    gather_facts,
 )
 
 BLOCKED = Occlusion(True, "'Box' has other surfaces on both sides")
 OPEN = Occlusion(False, "nothing can occlude anything: each of the 12 triangles has the whole scene on one side")
 VLM = TechniqueFacts("vlm", has_reflecting_lights=True, gains_by_occlusion=True)
-LAMPS = LampFacts(("Key", "Fill"), (), (), ())
+LAMPS = LampFacts(("Key", "Fill"), (), (), (), ("Key", "Fill"))
 NO_LAMPS = LampFacts((), (), (), ())
 SCREEN = ScreenFacts(1000, 800, 250, np.zeros(3), np.ones(3))
 FACTS = SceneFacts(
@@ -106,6 +109,15 @@ NOT_CALLED_FOR = [
     (
         "indirect_light",
         {"lamps": NO_LAMPS, "is_lit_by_world": False, "light_mesh": LightMeshFacts(44, 40, 0, 0)},
+        "neither lamp nor world lights the 44",
+    ),
+    (
+        "indirect_light",
+        {
+            "lamps": LampFacts(("Key",), (), (), ()),
+            "is_lit_by_world": False,
+            "light_mesh": LightMeshFacts(44, 40, 0, 0),
+        },
         "neither lamp nor world lights the 44",
     ),
     ("light_tags", {"light_mesh": LightMeshFacts(44, 40, 2, 0)}, "none of the 44 virtual lights has a tag"),
@@ -244,3 +256,21 @@ def test_a_plan_survives_being_sent() -> None:
     tree = {part: [vars(decision) for decision in getattr(plan, part)] for part in ("effects", "structures")}
     assert plan_from_tree(tree) == plan
     assert plan_from_tree({"effects": [], "structures": []}) == EffectPlan()
+
+
+def test_a_lamp_that_shines_on_virtual_lights_alone_is_light() -> None:
+    """Lights drawn by hand need not stand for a surface: phase one then measures on themselves."""
+    card = lights_from_triangles([[(0.0, 0.0, 3.0), (0.0, 1.0, 3.0), (1.0, 0.0, 3.0)]], emission=0.0, colour=0.5)
+    floor = quad((-1.0, -1.0, 0.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    upwards = Light("up", AREA, (20.0,) * 3, (0.0, 0.0, 1.5), y_axis=(0.0, -1.0, 0.0), z_axis=(0.0, 0.0, -1.0))
+    scene = SceneSnapshot("card", (floor,), lights=(upwards,))
+    for snapshot, named in (
+        (scene, ("up",)),
+        (replace(scene, lights=(replace(upwards, position=(0.0, 0.0, 4.0)),)), ()),
+    ):
+        facts = gather_facts(snapshot, card, VLM, OPEN, OPEN, 1)
+        assert facts.lamps.on_lights == named
+        plan = plan_effects(facts)
+        assert plan.runs("indirect_light") == bool(named)
+        assert not plan.runs("direct_light")
+        assert "'up' shines past every surface" in plan["direct_light"].reason

@@ -142,6 +142,10 @@ def _lights(random: np.random.Generator, snapshot: SceneSnapshot) -> VirtualLigh
         return np.concatenate([np.repeat(getattr(mesh, name), count, axis=0) for mesh in snapshot.meshes])
 
     lights = lights_from_triangles(corners, spread("emission"), spread("reflectance"), spread("tag_ids"))
+    if random.random() < 0.2:
+        # Drawn by hand, away from every surface: measured on itself.
+        card = np.array([[(-0.5, -0.5, 3.0), (-0.5, 0.5, 3.0), (0.5, -0.5, 3.0)]])
+        return lights_from_triangles(card, 0.0, 0.7)
     if random.random() < 0.1:
         return replace(lights, colour=np.zeros_like(lights.colour), emission=np.zeros_like(lights.emission))
     return lights

@@ -13,7 +13,7 @@ from tests.render.closed_rooms import empty_room, inward_box
 from tests.render.rooms import camera_at, mesh_lights, quad
 from vlm_addon.core.effects import REUSE, RUN, SKIP
 from vlm_addon.core.errors import InvalidInput
-from vlm_addon.core.scene import DIFFUSE, POINT, PRINCIPLED, SPOT, Light, Material, SceneSnapshot
+from vlm_addon.core.scene import AREA, DIFFUSE, POINT, PRINCIPLED, SPOT, Light, Material, SceneSnapshot
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import Frame, RenderSettings
 from vlm_addon.render.geometry import GpuGeometry
@@ -24,7 +24,7 @@ from vlm_addon.render.view import make_view
 
 LAMP = Light("Lamp", POINT, (30.0, 30.0, 30.0), (0.0, 0.0, 0.5))
 SMALL = RenderSettings(24, 18, "vlm", {"lights": "all"}, samples=2, shadow_resolution=64, shadow_samples=2)
-NEEDED = {"plan", "geometry", "G-buffer", "screen census", "accumulate", "read back"}
+NEEDED = {"plan", "geometry", "G-buffer", "accumulate", "read back"}
 """Passes of a frame that shows a scene without light."""
 
 
@@ -52,6 +52,28 @@ def test_without_any_light_there_is_no_pass_but_what_shows_the_surface(device: D
     assert {each.action for each in frame.plan.effects} == {SKIP}
     assert frame.images["combined"][..., :3].max() == 0.0
     assert (frame.images["combined"][..., 3] == 1.0).all()
+
+
+def test_a_dark_scene_with_glossy_surfaces_is_not_even_counted(device: Device) -> None:
+    frame = rendered(device, replace(glossy_room(), lights=()))
+    assert passes(frame) <= NEEDED
+
+
+def test_a_lamp_that_reaches_virtual_lights_alone_lights_the_scene(device: Device) -> None:
+    card = quad((-1.0, -1.0, 3.0), (0.0, 2.0, 0.0), (2.0, 0.0, 0.0))
+    floor = quad((-2.0, -2.0, 0.0), (4.0, 0.0, 0.0), (0.0, 4.0, 0.0))
+    upwards = Light("up", AREA, (20.0,) * 3, (0.0, 0.0, 1.5), y_axis=(0.0, -1.0, 0.0), z_axis=(0.0, 0.0, -1.0))
+    camera = camera_at((0.0, -4.0, 2.0), (0.0, 0.0, 0.0), lens=20.0)
+    scene = SceneSnapshot("card", (floor,), (Material("dull", DIFFUSE),), lights=(upwards,), camera=camera)
+    lights = mesh_lights((card,), colour=0.8, emission=0.0)
+    planned, everything = (device.render(scene, lights, replace(SMALL, economical=each)) for each in (True, False))
+    assert planned.images["combined"][..., :3].max() > 0.01
+    np.testing.assert_allclose(planned.images["combined"], everything.images["combined"], atol=1e-6)
+
+
+def test_negative_light_is_refused(device: Device) -> None:
+    with pytest.raises(InvalidInput, match=r"'Lamp'.*-20"):
+        rendered(device, empty_room([replace(LAMP, power=(30.0, -20.0, 30.0))]))
 
 
 def test_with_light_there_are_more(device: Device) -> None:

@@ -54,6 +54,9 @@ def read_light(
     radius = 0.0 if lamp.type in (SUN, AREA) else lamp.shadow_soft_size
     color = _color(lamp, evaluator, to_rec709, owner)
     power = color * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0) * _normalization(lamp, radius, size_x, size_y)
+    if min(power) < 0.0:
+        report(owner, f"sends out negative light ({_vector(power)})", "what is negative of it counts as 0")
+        power = np.maximum(power, 0.0)
     spot_scale = (1.0, 1.0)
     if lamp.type == SPOT and scale[2] > 0.0:
         spot_scale = (float(scale[0] / scale[2]), float(scale[1] / scale[2]))

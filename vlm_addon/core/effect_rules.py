@@ -65,7 +65,7 @@ def _is_dark(facts: SceneFacts) -> Verdict | None:
     if facts.has_light:
         return None
     return Verdict(
-        NEUTRAL, "nothing shines: no lamp has power and a surface before it, the world is black, and no material glows"
+        NEUTRAL, "nothing shines: no lamp has power and something before it, the world is black, and no material glows"
     )
 
 
@@ -145,7 +145,7 @@ def _light_of_light_mesh(facts: SceneFacts) -> Verdict:
     assert lights is not None
     if lights.glowing:
         return Verdict(CALLED_FOR, f"{lights.glowing:,} of {lights.lights:,} virtual lights shine by themselves")
-    if not facts.lamps.shining and not facts.is_lit_by_world:
+    if not facts.lamps.on_lights and not facts.is_lit_by_world:
         return Verdict(NEUTRAL, f"neither lamp nor world lights the {lights.lights:,} virtual lights")
     if not lights.reflecting:
         return Verdict(NEUTRAL, f"none of the {lights.lights:,} virtual lights reflects or shines")

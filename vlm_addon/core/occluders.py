@@ -18,7 +18,7 @@ MOST_PAIRS_FOR_EACH = 1_000_000
 """The same where each triangle is judged, some hundredths of a second: this may be done for every frame."""
 
 _AT_ONCE = 1_000_000
-_SLACK = 1e-6
+_SLACK = 3e-7
 """Of the scene's diagonal, some roundings of a place in float32: a point so near to a plane is in it."""
 
 

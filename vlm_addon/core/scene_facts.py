@@ -64,13 +64,15 @@ class LightMeshFacts:
 
 @dataclass(frozen=True)
 class LampFacts:
-    """Names of lamps. shining: that light something; dark: without power; beside: that shine past every surface.
-    not_on_screen: of the shining ones, those that light nothing that the picture shows."""
+    """Names of lamps. shining: that may light a surface; dark: without power; beside: that shine past every surface.
+    not_on_screen: of the shining ones, those that light nothing that the picture shows. on_lights: that may shine on
+    the source samples of virtual lights, which need not lie on a surface."""
 
     shining: tuple[str, ...]
     dark: tuple[str, ...]
     beside: tuple[str, ...]
     not_on_screen: tuple[str, ...]
+    on_lights: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,8 @@ class SceneFacts:
     def has_light(self) -> bool:
         """Whether anything shines."""
         glows = self.light_mesh is not None and self.light_mesh.glowing > 0
-        return bool(self.lamps.shining) or self.is_lit_by_world or bool(self.glowing) or glows
+        shines = bool(self.lamps.shining or self.lamps.on_lights)
+        return shines or self.is_lit_by_world or bool(self.glowing) or glows
 
 
 def gather_facts(
@@ -117,7 +120,7 @@ def gather_facts(
     return SceneFacts(
         scene=snapshot.name,
         triangles=snapshot.triangle_count,
-        lamps=lamp_facts(snapshot),
+        lamps=lamp_facts(snapshot, light_mesh),
         is_lit_by_world=is_lit_by_world(snapshot),
         glowing=tuple(material.name for material in used if max(material.emission) > 0.0),
         layered=tuple(material.name for material in used if material.model == PRINCIPLED),
@@ -147,8 +150,10 @@ def _used_materials(snapshot: SceneSnapshot) -> tuple[Material, ...]:
     return tuple(snapshot.materials[index] for index in sorted(used))
 
 
-def lamp_facts(snapshot: SceneSnapshot, screen: ScreenFacts | None = None) -> LampFacts:
-    """Of the lamps of a snapshot in world space; `screen` likewise."""
+def lamp_facts(
+    snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | None, screen: ScreenFacts | None = None
+) -> LampFacts:
+    """Of the lamps of a snapshot in world space; the others likewise."""
     boxes = np.array([box_corners(*mesh.bounds()) for mesh in snapshot.meshes if len(mesh.triangles)])
     lit = [lamp for lamp in snapshot.lights if max(lamp.power) > 0.0]
     shining = [lamp for lamp in lit if in_reach(lamp, boxes.reshape(-1, 8, 3)).any()]
@@ -158,7 +163,15 @@ def lamp_facts(snapshot: SceneSnapshot, screen: ScreenFacts | None = None) -> La
         _names(lamp for lamp in snapshot.lights if lamp not in lit),
         _names(lamp for lamp in lit if lamp not in shining),
         _names(hidden),
+        _names(lamp for lamp in lit if _lights_samples(lamp, light_mesh)),
     )
+
+
+def _lights_samples(lamp: Light, light_mesh: VirtualLightMesh | None) -> bool:
+    if light_mesh is None or not len(light_mesh.samples.positions):
+        return False
+    points = light_mesh.samples.positions
+    return bool(in_reach(lamp, box_corners(points.min(axis=0), points.max(axis=0))[None]).any())
 
 
 def lights_picture(lamp: Light, screen: ScreenFacts) -> bool:

@@ -28,6 +28,7 @@ class EffectHistory:
         world, frame = scene.world, scene.settings
         self._lights_key = scene.kept.digests.of(
             (world.lights, world.materials, world.textures, world.world_radiance, world.environment),
+            [(mesh.material_indices, mesh.corner_colors) for mesh in world.meshes],
             scene.world_lights,
             (frame.technique, frame.technique_settings, frame.effects, frame.shadow_resolution, frame.shadow_samples),
         )

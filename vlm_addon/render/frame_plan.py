@@ -36,6 +36,7 @@ class FramePlanner:
         self._choices, _ = parse_choices(settings.effects)
         self._economical = settings.economical
         self._snapshot = snapshot
+        self._light_mesh = light_mesh
         occlusion, found = _occlusions(kept, snapshot, light_mesh, world_lights)
         self.occluders = found.triangles
         self._facts = gather_facts(snapshot, light_mesh, technique, occlusion, found.occlusion, settings.samples)
@@ -46,13 +47,13 @@ class FramePlanner:
     def asks_screen(self) -> bool:
         """Whether what a picture shows may change what it needs."""
         bounded = any(lamp.kind in BOUNDED_KINDS for lamp in self._snapshot.lights)
-        return self._economical and bool(self._facts.glossy or bounded)
+        return self._economical and self._facts.has_light and bool(self._facts.glossy or bounded)
 
     def picture(self, screen: ScreenFacts | None) -> EffectPlan:
         """The plan of the next picture. screen: what it shows, None where nobody has counted."""
         if screen is None:
             return self.plan
-        lamps = lamp_facts(self._snapshot, screen)
+        lamps = lamp_facts(self._snapshot, self._light_mesh, screen)
         facts = replace(self._facts, screen=screen, lamps=lamps)
         plan = plan_effects(facts, self._choices, economical=self._economical)
         self.plan = plan if self._pictures == 0 else self.plan.merged(plan)

@@ -141,6 +141,8 @@ def _require_renderable(snapshot: SceneSnapshot, light_mesh: VirtualLightMesh | 
     for light in snapshot.lights:
         if not np.isfinite(light.power).all():
             raise InvalidInput(f"light {light.name!r}", f"its power is {light.power}", "give it a finite power")
+        if min(light.power) < 0.0:
+            raise InvalidInput(f"light {light.name!r}", f"its power is {light.power}", "give it a power of at least 0")
     if light_mesh is not None:
         require_valid(light_mesh)
 
