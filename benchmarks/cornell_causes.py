@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.support import displayed, open_sample, quiet
+from benchmarks.support import ALONE, displayed, open_sample, quiet
 from vlm_addon.blender.cycles_reference import render_reference
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.metrics import flip, relative_rmse
@@ -43,7 +43,7 @@ def main() -> None:
     with Device() as device:
 
         def picture(light_mesh: VirtualLightMesh) -> dict[str, Float32]:
-            settings = RenderSettings(SIZE_PX, SIZE_PX, samples=SAMPLES)
+            settings = RenderSettings(SIZE_PX, SIZE_PX, samples=SAMPLES, effects=ALONE)
             return device.render(scene.snapshot, light_mesh, settings).images
 
         fine = picture(subdivide_light_mesh(on_surface, FINE_LIGHTS))

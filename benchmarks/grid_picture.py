@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from benchmarks.support import displayed, open_sample, rgb
+from benchmarks.support import ALONE, displayed, open_sample, rgb
 from vlm_addon.core.light_grid import FEW_LIGHTS
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.scene import SceneSnapshot
@@ -74,7 +74,7 @@ def _frames(device: Device, scene: SceneSnapshot, lights: VirtualLightMesh, size
     most = MOST_LIGHTS if len(lights) < FEW_LIGHTS else 0
 
     def frame(**values: object) -> Frame:
-        settings = RenderSettings(size, size, technique_settings=values, samples=SAMPLES, buffers=True)
+        settings = RenderSettings(size, size, technique_settings=values, samples=SAMPLES, buffers=True, effects=ALONE)
         return device.render(scene, lights, settings)
 
     by_range = {f"range {reach:g}": frame(lights="range", grid=CELLS, max_lights=most, range=reach) for reach in RANGES}

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.many_light_published import LIGHTS, PUBLISHED, PUBLISHED_STAGES, TILES, Published
-from benchmarks.support import open_sample, quiet
+from benchmarks.support import ALONE, open_sample, quiet
 from vlm_addon.blender.cycles_reference import Reference, render_reference
 from vlm_addon.core.errors import VlmError
 from vlm_addon.core.metrics import relative_rmse
@@ -272,7 +272,7 @@ class Room:
         """Error, bias, and ms of a frame and of what is made once."""
         device, side = self._device, self._options.room_size
         lights = self._light_mesh if technique == "vlm" else None
-        settings = RenderSettings(side, side, technique, values, 1, shadow_samples=SHADOW_SAMPLES)
+        settings = RenderSettings(side, side, technique, values, 1, shadow_samples=SHADOW_SAMPLES, effects=ALONE)
         # Compiles shaders; what that makes is forgotten.
         device.render(self._scene, lights, replace(settings, width=8, height=8))
         frames = []

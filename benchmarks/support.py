@@ -21,6 +21,8 @@ from vlm_addon.core.scene import Float32
 
 T = TypeVar("T")
 
+ALONE = {"ambient_occlusion": "off"}
+"""Effects of pictures that are to show what a technique finds by itself."""
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLE_BLENDS = ROOT / "sample_blends"
 MODELS = ROOT.parent / "shared" / "models"

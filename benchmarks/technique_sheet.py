@@ -14,7 +14,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from benchmarks.support import displayed, open_sample, quiet, rgb
+from benchmarks.support import ALONE, displayed, open_sample, quiet, rgb
 from vlm_addon.blender.cycles_reference import Reference, render_reference
 from vlm_addon.blender.light_mesh_io import Extraction
 from vlm_addon.core.light_mesh import VirtualLightMesh
@@ -56,7 +56,7 @@ def main() -> None:
                 truth = render_reference(options.size, options.size, 1, options.reference_samples)
             for technique in technique_list():
                 chosen = SETTINGS.get((name, technique.name), {})
-                settings = RenderSettings(options.size, options.size, technique.name, chosen, SAMPLES)
+                settings = RenderSettings(options.size, options.size, technique.name, chosen, SAMPLES, effects=ALONE)
                 frame = device.render(scene.snapshot, lights, settings)
                 print(f"{name}, {technique.name} …", flush=True)
                 pictures.append((technique.name, displayed(target, rgb(frame.images["combined"]))))

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.support import SAMPLE_BLENDS, quiet
+from benchmarks.support import ALONE, SAMPLE_BLENDS, quiet
 from vlm_addon.blender.cycles_reference import render_reference
 from vlm_addon.blender.light_mesh_io import Extraction, extract
 from vlm_addon.blender.scene_file import open_scene
@@ -57,10 +57,12 @@ def main() -> None:
     rows = []
     with Device() as device:
         for label, technique, chosen in RUNS:
-            settings = RenderSettings(options.size, options.size, technique, chosen, options.samples, buffers=True)
+            settings = RenderSettings(
+                options.size, options.size, technique, chosen, options.samples, buffers=True, effects=ALONE
+            )
             frame = device.render(poses[-1].snapshot, poses[-1].light_mesh, settings)
             indirect = frame.images["indirect"]
-            single = RenderSettings(options.size, options.size, technique, chosen, 1)
+            single = RenderSettings(options.size, options.size, technique, chosen, 1, effects=ALONE)
             regions = _regions(frame, poses[-1].snapshot)
             errors = [f"{relative_rmse(indirect, truth, region):.1%}" for region in regions]
             light = f"{indirect.mean() / truth.mean():.3f}"

@@ -17,7 +17,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from benchmarks.support import quiet
+from benchmarks.support import ALONE, quiet
 from vlm_addon.blender.cycles_reference import render_reference
 from vlm_addon.blender.extract import extract_scene
 from vlm_addon.core.environment import map_directions, map_solid_angles
@@ -135,7 +135,7 @@ def picture_rows(
     with quiet():
         reference = render_reference(width, height, 1, arguments.reference_samples)
     for count in arguments.counts[:PICTURED_COUNTS]:
-        settings = RenderSettings(width, height, "vlm", samples=arguments.samples, world_lights=count)
+        settings = RenderSettings(width, height, "vlm", samples=arguments.samples, world_lights=count, effects=ALONE)
         start = time.perf_counter()
         frame = device.render(snapshot, light_mesh, settings)
         seconds = time.perf_counter() - start

@@ -11,6 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
+from benchmarks.support import ALONE  # noqa: E402
 from tests.render.closed_rooms import inward_box  # noqa: E402
 from tests.render.rooms import camera_at  # noqa: E402
 from vlm_addon.bake import BakeSettings, bake  # noqa: E402
@@ -48,7 +49,9 @@ def errors(device, name, side, reference_samples, samples, kind="octree"):
     reference = render_reference(side, side, 1, reference_samples)
     found = []
     for visibility in ("none", kind):
-        settings = RenderSettings(side, side, "vlm", {"visibility": visibility}, samples, shadow_samples=8)
+        settings = RenderSettings(
+            side, side, "vlm", {"visibility": visibility}, samples, shadow_samples=8, effects=ALONE
+        )
         image = device.render(snapshot, light_mesh, settings).images["indirect"]
         found.append(relative_rmse(image, reference.images["indirect"]))
     return *found, reference.noise["indirect"]
@@ -90,7 +93,9 @@ def test_a_closed_room_in_the_atrium_stays_black(device, kind, chosen, lights, w
     room = replace(hall, camera=camera_at((-1.3, -1.3, 2.0), (1.0, 1.0, 0.8), lens=18.0))
 
     def picture(scene, visibility):
-        settings = RenderSettings(48, 32, "vlm", {**chosen, "visibility": visibility}, 2, shadow_samples=1)
+        settings = RenderSettings(
+            48, 32, "vlm", {**chosen, "visibility": visibility}, 2, shadow_samples=1, effects=ALONE
+        )
         return device.render(scene, light_mesh, settings).images["indirect"]
 
     lit, dark = picture(hall, kind), picture(room, kind)
