@@ -106,7 +106,7 @@ def test_everything_runs_what_the_plan_leaves_out(lit_room, tmp_path, capsys):
     [
         ("glow=on", "'glow'"),
         ("shadows=maybe", "'maybe'"),
-        ("shadows", "KEY=VALUE"),
+        ("shadows", "--effect 'shadows': it is not KEY=VALUE"),
         ("ambient_occlusion.radius=wide", "wide"),
     ],
 )

@@ -274,3 +274,11 @@ def test_a_lamp_that_shines_on_virtual_lights_alone_is_light() -> None:
         assert plan.runs("indirect_light") == bool(named)
         assert not plan.runs("direct_light")
         assert "'up' shines past every surface" in plan["direct_light"].reason
+
+
+def test_where_the_virtual_lights_are_switched_off_maps_show_what_the_camera_does_not_see() -> None:
+    for off in ("indirect_light", "light_mesh_reflection"):
+        plan = plan_effects(FACTS, {off: OFF})
+        assert not plan.runs("light_mesh_reflection")
+        assert plan.runs("map_reflection")
+    assert "does not run" in plan_effects(FACTS, {"indirect_light": OFF})["light_mesh_reflection"].reason

@@ -176,6 +176,19 @@ def test_accumulation_brings_reflections_nearer_to_their_mean() -> None:
     assert errors[-1] < 0.6 * errors[0]
 
 
+def test_no_light_of_a_lamp_that_was_dimmed_is_left_in_reflections() -> None:
+    room = glossy_room(roughness=0.4, metallic=1.0)
+    dim = replace(room, lights=(replace(LAMP, power=(0.3, 0.3, 0.3)),))
+    wanted: dict[str, Any] = {"samples": 1, "buffers": True, "effects": {"temporal_accumulation": "on"}}
+    with Device() as own:
+        for _ in range(6):
+            rendered(own, room, **wanted)
+        after = rendered(own, dim, **wanted).images["specular"]
+        truth = rendered(own, dim, samples=64, buffers=True).images["specular"]
+    assert after.mean() == pytest.approx(truth.mean(), rel=0.25)
+    assert after.max() < 6.0 * truth.max()
+
+
 def test_the_census_counts_what_the_gbuffer_holds(device: Device) -> None:
     sheet = quad((-0.5, -0.25, 0.0), (1.0, 0.0, 0.0), (0.0, 0.5, 0.0), material=1)
     materials = (Material("dull", DIFFUSE), Material("chrome", PRINCIPLED, metallic=1.0))

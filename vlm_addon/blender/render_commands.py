@@ -97,9 +97,9 @@ def effects_command(arguments: Namespace) -> None:
 
 def _asked_settings(arguments: Namespace, technique: str) -> RenderSettings:
     """What the command line says of a frame, of a size that is not known yet. Raises InvalidInput."""
-    chosen = _setting_texts(arguments.set)
+    chosen = _setting_texts(arguments.set, "--set")
     from_mapping(technique_by_name(technique).settings, chosen, f"technique {technique!r}")
-    effects = checked_effects(_setting_texts(arguments.effect))
+    effects = checked_effects(_setting_texts(arguments.effect, "--effect"))
     width, height = arguments.size or (1, 1)
     return RenderSettings(width, height, technique, chosen, effects=effects)
 
@@ -116,12 +116,12 @@ def _with_scene_settings(settings: RenderSettings, size: tuple[int, int] | None)
     return replace(settings, width=width, height=height, technique_settings=asdict(chosen), effects=effects)
 
 
-def _setting_texts(pairs: Sequence[str]) -> dict[str, str]:
+def _setting_texts(pairs: Sequence[str], option: str) -> dict[str, str]:
     texts = {}
     for pair in pairs:
         name, equals, value = pair.partition("=")
         if not (name and equals):
-            raise InvalidInput(f"--set {pair!r}", "it is not KEY=VALUE", "write it as in --set NAME=1")
+            raise InvalidInput(f"{option} {pair!r}", "it is not KEY=VALUE", f"write it as in {option} NAME=1")
         texts[name] = value
     return texts
 

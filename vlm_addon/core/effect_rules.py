@@ -205,6 +205,8 @@ def _screen_reflection(facts: SceneFacts, before: Before) -> Verdict:
 def _light_mesh_reflection(facts: SceneFacts, before: Before) -> Verdict:
     if not facts.technique.has_reflecting_lights:
         return Verdict(IMPOSSIBLE, f"technique {facts.technique.name!r} has no polygons that shine")
+    if "indirect_light" not in before.enabled:
+        return Verdict(IMPOSSIBLE, f"technique {facts.technique.name!r}, which lights the virtual lights, does not run")
     if "indirect_light" not in before.running:
         return _reflections(facts) or Verdict(NEUTRAL, "no virtual light shines")
     return _reflections(facts) or _glossy(facts)

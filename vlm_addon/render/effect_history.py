@@ -25,7 +25,9 @@ class EffectHistory:
         self._motion_pass = MotionPass(scene.context, scene.shaders, scene.kept, scene.world, scene.space, *size)
         self._motion: tuple[int, Motion] | None = None
         self._accumulators: dict[str, Accumulator] = {}
+        self._shows_light: set[str] = set()
         world, frame = scene.world, scene.settings
+        # Old light cannot be told from rare bright events of noise by what neighbours find, so it is dropped.
         self._lights_key = scene.kept.digests.of(
             (world.lights, world.materials, world.textures, world.world_radiance, world.environment),
             [(mesh.material_indices, mesh.corner_colors) for mesh in world.meshes],
@@ -36,8 +38,11 @@ class EffectHistory:
     def picture(self, name: str, *, follows_eye: bool) -> int:
         """The number of the picture, over frames, that the effect is about to look at: what its noise is made from.
 
-        follows_eye: whether what is seen of a place depends on where from.
+        follows_eye: whether it shows light, which depends on where from a place is seen, and on the lights: with others
+        its history is dropped.
         """
+        if follows_eye:
+            self._shows_light.add(name)
         if name not in self._accumulators:
             scene = self._scene
             self._accumulators[name] = Accumulator(
@@ -55,10 +60,9 @@ class EffectHistory:
                 frame.view,
                 self._scene.space,
                 found,
-                key,
-                self._lights_key,
-                self._motion[1],
-                frame.sample_index,
+                key + (self._lights_key if name in self._shows_light else ""),
+                motion=self._motion[1],
+                sample_index=frame.sample_index,
             )
 
     def images(self) -> dict[str, Float32]:
