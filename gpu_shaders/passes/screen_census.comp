@@ -12,8 +12,6 @@ layout(std430, binding = RESULT_BINDING) buffer Census {
     uint highest[3];
 };
 
-shared uint group_shown, group_glossy, group_lowest[3], group_highest[3];
-
 // Bits in the order of the numbers that they stand for.
 uint ordered_bits(float value) {
     uint bits = floatBitsToUint(value);
@@ -25,35 +23,35 @@ bool is_glossy(Surface surface) {
     return surface.model == MODEL_PRINCIPLED && (surface.metallic > 0.0 || has_interface);
 }
 
+// Each invocation counts a block of pixels by itself: atomics of every pixel would take longer than what they save.
 void main() {
-    if (gl_LocalInvocationIndex == 0u) {
-        group_shown = group_glossy = 0u;
-        for (int axis = 0; axis < 3; ++axis) {
-            group_lowest[axis] = 0xffffffffu;
-            group_highest[axis] = 0u;
+    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * BLOCK_SIDE;
+    ivec2 end = min(first + BLOCK_SIDE, textureSize(gbuffer_position, 0));
+    uint block_shown = 0u, block_glossy = 0u;
+    uvec3 block_lowest = uvec3(0xffffffffu), block_highest = uvec3(0u);
+    for (int y = first.y; y < end.y; ++y) {
+        for (int x = first.x; x < end.x; ++x) {
+            ivec2 pixel = ivec2(x, y);
+            if (!pixel_shows_geometry(pixel)) {
+                continue;
+            }
+            vec3 position = texelFetch(gbuffer_position, pixel, 0).xyz;
+            uvec3 bits = uvec3(ordered_bits(position.x), ordered_bits(position.y), ordered_bits(position.z));
+            block_lowest = min(block_lowest, bits);
+            block_highest = max(block_highest, bits);
+            ++block_shown;
+#if COUNTS_GLOSSY
+            block_glossy += is_glossy(fetch_surface(pixel)) ? 1u : 0u;
+#endif
         }
     }
-    barrier();
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (all(lessThan(pixel, textureSize(gbuffer_position, 0))) && pixel_shows_geometry(pixel)) {
-        Surface surface = fetch_surface(pixel);
-        atomicAdd(group_shown, 1u);
-        if (is_glossy(surface)) {
-            atomicAdd(group_glossy, 1u);
-        }
-        for (int axis = 0; axis < 3; ++axis) {
-            uint bits = ordered_bits(surface.position[axis]);
-            atomicMin(group_lowest[axis], bits);
-            atomicMax(group_highest[axis], bits);
-        }
+    if (block_shown == 0u) {
+        return;
     }
-    barrier();
-    if (gl_LocalInvocationIndex == 0u && group_shown > 0u) {
-        atomicAdd(shown, group_shown);
-        atomicAdd(glossy, group_glossy);
-        for (int axis = 0; axis < 3; ++axis) {
-            atomicMin(lowest[axis], group_lowest[axis]);
-            atomicMax(highest[axis], group_highest[axis]);
-        }
+    atomicAdd(shown, block_shown);
+    atomicAdd(glossy, block_glossy);
+    for (int axis = 0; axis < 3; ++axis) {
+        atomicMin(lowest[axis], block_lowest[axis]);
+        atomicMax(highest[axis], block_highest[axis]);
     }
 }

@@ -64,7 +64,7 @@ class _Pictures:
         passes = scene.context, scene.shaders, settings.width, settings.height
         self._setup = setup
         self._gbuffer = GBufferPass(*passes)
-        self._census = ScreenCensusPass(scene.context, scene.shaders)
+        self._census = ScreenCensusPass(scene.context, scene.shaders, counts_glossy=setup.planner.has_glossy)
         self._direct = DirectLightPass(*passes)
         self._effects = FrameEffects(scene, setup.technique, setup.effect_settings, len(setup.request.snapshot.lights))
         environment = setup.request.snapshot.environment

@@ -49,6 +49,11 @@ class FramePlanner:
         bounded = any(lamp.kind in BOUNDED_KINDS for lamp in self._snapshot.lights)
         return self._economical and self._facts.has_light and bool(self._facts.glossy or bounded)
 
+    @property
+    def has_glossy(self) -> bool:
+        """Whether any surface of the scene has a specular layer."""
+        return bool(self._facts.glossy)
+
     def picture(self, screen: ScreenFacts | None) -> EffectPlan:
         """The plan of the next picture. screen: what it shows, None where nobody has counted."""
         if screen is None:

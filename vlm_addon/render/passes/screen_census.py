@@ -18,7 +18,8 @@ from .gbuffer import GBuffer
 if TYPE_CHECKING:
     import moderngl
 
-GROUP_SIDE = 8
+GROUP_SIDE, BLOCK_SIDE = 4, 8
+"""Invocations of a work group, and pixels that each counts, along a side."""
 _SIGN = np.uint32(0x80000000)
 _EMPTY = np.array([0, 0, *(3 * [0xFFFFFFFF]), *(3 * [0])], np.uint32)
 
@@ -26,9 +27,11 @@ _EMPTY = np.array([0, 0, *(3 * [0xFFFFFFFF]), *(3 * [0])], np.uint32)
 class ScreenCensusPass:
     """Counts what pixels show; reads some bytes back, so it waits for the device."""
 
-    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary) -> None:
+    def __init__(self, context: moderngl.Context, shaders: ShaderLibrary, *, counts_glossy: bool = True) -> None:
+        """counts_glossy: False where no material is, so that none need be looked at."""
         self._context = context
-        self._shader = shaders.compute("passes/screen_census.comp", {"GROUP_SIDE": GROUP_SIDE})
+        defines = {"GROUP_SIDE": GROUP_SIDE, "BLOCK_SIDE": BLOCK_SIDE, "COUNTS_GLOSSY": counts_glossy}
+        self._shader = shaders.compute("passes/screen_census.comp", defines)
         self._counts = context.buffer(reserve=_EMPTY.nbytes)
 
     def render(self, gbuffer: GBuffer, space: LocalSpace) -> ScreenFacts:
@@ -39,7 +42,8 @@ class ScreenCensusPass:
         self._counts.bind_to_storage_buffer(int(CONSTANTS["RESULT_BINDING"]))
         gbuffer.bind()
         width, height = gbuffer.size
-        self._shader.run(-(-width // GROUP_SIDE), -(-height // GROUP_SIDE))
+        side = GROUP_SIDE * BLOCK_SIDE
+        self._shader.run(-(-width // side), -(-height // side))
         self._context.memory_barrier()
         found = np.frombuffer(self._counts.read(), np.uint32)
         shown, glossy = int(found[0]), int(found[1])
