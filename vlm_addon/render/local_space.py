@@ -23,6 +23,8 @@ GRAIN = 0.25
 FLOAT32_STEP = 2.0**-23
 FINEST_SHARE = 2.0**-12
 """Of the width of the nearest thing that a camera can see whole: a quarter of a pixel of a picture of a thousand."""
+FINEST_SHARE_ORTHOGRAPHIC = 2.0**-18
+"""The same of an orthographic picture's width: with more, single pixels at shadows of grazing light differ."""
 STILL_GRAIN = 128.0
 """The same of the space that no camera moves: so that an object which widens the scene a little moves nothing else."""
 
@@ -124,8 +126,9 @@ def is_fine_enough(still: LocalSpace, camera: Camera) -> bool:
     however near something is. Otherwise only a space near the camera will do, as in a scene that is a kilometre wide
     and is seen from a hand's breadth."""
     left, right, _, _ = camera.frame(1, 1)
-    nearest = 1.0 if camera.kind == ORTHOGRAPHIC else camera.clip_start
-    return HALF_DIAGONAL * FLOAT32_STEP * still.unit <= FINEST_SHARE * nearest * (right - left)
+    is_orthographic = camera.kind == ORTHOGRAPHIC
+    finest = FINEST_SHARE_ORTHOGRAPHIC if is_orthographic else FINEST_SHARE * camera.clip_start
+    return HALF_DIAGONAL * FLOAT32_STEP * still.unit <= finest * (right - left)
 
 
 def _half_diagonal(low: Float64, high: Float64) -> tuple[float, bool]:
