@@ -169,6 +169,8 @@ def test_a_lamp_that_sees_nothing_then_turns_and_one_that_goes_into_a_block(used
     assert not nothing.images["indirect"].any()
     assert "shines past every surface" in nothing.plan["direct_light"].reason
     assert "reflective_maps" not in nothing.counters
+    wanted = RenderSettings(32, 24, "rsm_gather", samples=1, effects={"indirect_light": "on"})
+    assert used.render(hall(lights=(away,)), None, wanted).counters["reflective_maps"] == 1
     turned = rendered(used, hall(lights=(RIGHT,)))
     assert turned.images["indirect"].any()
     assert same(turned, fresh(hall(lights=(RIGHT,))))

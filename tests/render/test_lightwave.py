@@ -203,8 +203,12 @@ def test_a_lamp_that_sees_nothing_lights_nothing(device: Device) -> None:
 
 
 def test_a_scene_without_triangles_is_empty(device: Device) -> None:
-    frame = rendered(device, replace(empty_room([SPOT_LAMP]), meshes=()))
-    assert frame.counters.get("virtual_point_lights", 0) == 0
+    nothing = replace(empty_room([SPOT_LAMP]), meshes=())
+    assert not rendered(device, nothing).plan.runs("indirect_light")
+    # The technique itself, which the plan would leave out.
+    wanted = RenderSettings(WIDTH, HEIGHT, "lightwave", samples=1, effects={"indirect_light": "on"})
+    frame = device.render(nothing, None, wanted)
+    assert frame.counters["virtual_point_lights"] == 0
     assert frame.images["combined"][..., :3].max() == 0.0
 
 

@@ -58,8 +58,17 @@ def lit_by(
         return np.frombuffer(found.read(), np.float32).reshape(-1, 4).astype(float)
 
 
+FORCED = {"indirect_light": "on"}
+"""Effects of a frame whose technique runs although its plan would leave it out."""
+
+
 def rendered(device: Device, scene: SceneSnapshot, pictures: int = 1, size: int = 32, **settings: object) -> Frame:
     wanted = RenderSettings(size, 3 * size // 4, "second_order", settings, pictures, 64, 4, buffers=True)
+    return device.render(scene, None, wanted)
+
+
+def forced(device: Device, scene: SceneSnapshot) -> Frame:
+    wanted = RenderSettings(32, 24, "second_order", samples=1, shadow_resolution=64, buffers=True, effects=FORCED)
     return device.render(scene, None, wanted)
 
 
@@ -188,9 +197,10 @@ def test_light_switched_off_and_ten_lamps_and_none(device: Device) -> None:
     assert (rendered(device, empty_room([lamps[0], *off])).images["irradiance"] == alone).all()
     assert alone.any()
     for scene in (empty_room(off), empty_room([])):
-        frame = rendered(device, scene)
+        assert not rendered(device, scene).plan.runs("indirect_light")
+        frame = forced(device, scene)
         assert not frame.images["irradiance"].any()
-        assert frame.counters.get("indirect_lights", 0) == frame.counters.get("negative_lights", 0) == 0
+        assert frame.counters["indirect_lights"] == frame.counters["negative_lights"] == 0
 
 
 def test_lights_are_kept_while_nothing_but_the_camera_moves(device: Device) -> None:
@@ -316,9 +326,11 @@ def test_low_resolution_is_right_to_half_a_percent_where_7_of_8_pixels_are(
 
 
 def test_a_scene_without_surfaces_has_no_lights(device: Device) -> None:
-    frame = rendered(device, replace(empty_room([MIDDLE]), meshes=()))
+    nothing = replace(empty_room([MIDDLE]), meshes=())
+    assert not rendered(device, nothing).plan.runs("indirect_light")
+    frame = forced(device, nothing)
     assert not frame.images["combined"][..., :3].any()
-    assert frame.counters.get("indirect_lights", 0) == frame.counters.get("low_resolution_share", 0) == 0
+    assert frame.counters["indirect_lights"] == frame.counters["low_resolution_share"] == 0
 
 
 def test_lamps_that_cast_no_shadow_are_named(device: Device) -> None:
