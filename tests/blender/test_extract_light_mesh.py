@@ -228,7 +228,7 @@ def test_a_render_engine_gets_the_light_meshes_that_renders_hide(make_plane, mak
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (lambda o: o.__setitem__("vlm_schema", 2), "vlm_schema is 2"),
+        (lambda o: o.__setitem__("vlm_schema", 3), "vlm_schema is 3"),
         (lambda o: o.data.clear_geometry(), "it has no faces"),
         (lambda o: o.__setitem__("vlm_strength", -1.0), "negative"),
         (lambda o: o.__setitem__("vlm_strength", float("nan")), "not finite"),

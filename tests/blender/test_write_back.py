@@ -58,7 +58,7 @@ def test_it_survives_saving_and_loading(light_mesh, tmp_path):
 
 def test_the_object_is_as_the_table_says(light_mesh):
     made = write_light_mesh(light_mesh, NAME)
-    assert made["vlm_schema"] == 1
+    assert made["vlm_schema"] == 2
     assert (made["vlm_strength"], tuple(made["vlm_hue"]), made["vlm_dynamic"]) == (1.0, (1.0, 1.0, 1.0), False)
     assert (made.hide_render, made.display_type) == (True, "WIRE")
     assert [collection.name for collection in made.users_collection] == ["Virtual Light Meshes"]

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
+from .light_meshes import chosen_light_meshes, is_local
 from .names import is_light_mesh
 
 AUTHORING_MODULES = ("fast_simplification", "trimesh")
@@ -71,6 +72,17 @@ def _writing_problem(context: bpy.types.Context) -> str | None:
     if context.scene.library is not None:
         return f"The scene is linked from {context.scene.library.filepath}: open that file, or make the scene local"
     return None
+
+
+def light_faces_problem(context: bpy.types.Context) -> str | None:
+    """Why a tool that changes lights has nothing to change, or None."""
+    chosen = chosen_light_meshes(context)
+    if context.mode not in ("OBJECT", "EDIT_MESH"):
+        return "Leave this mode first: lights are changed in Object Mode (all of a light mesh) or Edit Mode (selected)"
+    if not chosen:
+        return "Select a light mesh (collection Virtual Light Meshes), or edit one and select faces"
+    linked = next((thing for thing in chosen if not is_local(thing)), None)
+    return f"{linked.name} is linked from another file: make it local first" if linked is not None else None
 
 
 def check_problem(context: bpy.types.Context) -> str | None:

@@ -128,8 +128,8 @@ def _left_out(depsgraph: Any, seen: set[str], report: FindingList) -> Iterator[A
 def _read_object(blender_object: Any, matrix: Float64, to_rec709: Float64, report: FindingList) -> VirtualLightMesh:
     owner = f"light mesh {blender_object.name!r}"
     version = blender_object[SCHEMA_PROPERTY]
-    if version != SCHEMA_VERSION:
-        problem = f"{SCHEMA_PROPERTY} is {version}, not {SCHEMA_VERSION}"
+    if not 1 <= version <= SCHEMA_VERSION:
+        problem = f"{SCHEMA_PROPERTY} is {version}, not 1 to {SCHEMA_VERSION}"
         raise InvalidInput(owner, problem, "open it with the version of the extension that wrote it")
     mesh = blender_object.to_mesh()
     try:

@@ -7,19 +7,26 @@ from typing import Any
 
 COLLECTION = "Virtual Light Meshes"
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 SCHEMA_PROPERTY = "vlm_schema"
 STRENGTH_PROPERTY = "vlm_strength"
 HUE_PROPERTY = "vlm_hue"
 DYNAMIC_PROPERTY = "vlm_dynamic"
 SOURCES_PROPERTY = "vlm_sources"
+SOURCE_IDS_PROPERTY = "vlm_source_ids"
+LINKS_PROPERTY = "vlm_links"
 
 COLOR_ATTRIBUTE = "vlm_color"
 EMISSION_ATTRIBUTE = "vlm_emission"
 TAG_ATTRIBUTE = "vlm_tag"
 AREA_SCALE_ATTRIBUTE = "vlm_area_scale"
+LOCK_ATTRIBUTE = "vlm_lock"
 
+ID_PROPERTY = "vlm_id"
 TAG_PROPERTY = "vlm_tag"
+
+MORE_DETAIL_GROUP = "VLM More"
+NO_LIGHTS_GROUP = "VLM None"
 
 
 def is_light_mesh(blender_object: Any) -> bool:

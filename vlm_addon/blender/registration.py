@@ -8,8 +8,11 @@ from contextlib import ExitStack
 
 import bpy
 
-from . import authoring, cli_commands, engine, engine_panels, panels, properties
+from . import authoring, cli_commands, engine, engine_panels, migration, panels, properties
 from .render_process import KEPT
+
+PARTS = (migration,)
+"""Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()
 """What `unregister` has to undo; Blender calls the two functions without any object between them."""
@@ -27,6 +30,8 @@ def register(operator_classes: Iterable[type]) -> None:
         for cls in (*operator_classes, *panels.CLASSES, engine.VLM_RenderEngine):
             bpy.utils.register_class(cls)
             undo.callback(bpy.utils.unregister_class, cls)
+        for part in PARTS:
+            part.register(undo)
         engine_panels.register()
         undo.callback(engine_panels.unregister)
         handle = cli_commands.register()

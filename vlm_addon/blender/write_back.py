@@ -14,6 +14,7 @@ from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.scene import Float64
 from .color_space import convert, rec709_to_working
+from .light_meshes import set_sources
 from .names import (
     AREA_SCALE_ATTRIBUTE,
     COLLECTION,
@@ -23,7 +24,6 @@ from .names import (
     HUE_PROPERTY,
     SCHEMA_PROPERTY,
     SCHEMA_VERSION,
-    SOURCES_PROPERTY,
     STRENGTH_PROPERTY,
     TAG_ATTRIBUTE,
     is_light_mesh,
@@ -55,7 +55,7 @@ def write_light_mesh(light_mesh: VirtualLightMesh, name: str, sources: Sequence[
     blender_object.matrix_world = Matrix.Translation(middle)
     blender_object[SCHEMA_PROPERTY] = SCHEMA_VERSION
     blender_object[DYNAMIC_PROPERTY] = bool(light_mesh.dynamic.any())
-    blender_object[SOURCES_PROPERTY] = "\n".join(sources)
+    set_sources(blender_object, sources, scene)
     blender_object.hide_render = True
     blender_object.display_type = "WIRE"
     return blender_object

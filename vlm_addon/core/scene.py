@@ -186,11 +186,16 @@ class Camera:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing a user should know: which object (and node), what was found, what was done or can be done."""
+    """One thing a user should know: which object (and node), what was found, what was done or can be done.
+
+    kind: a word for programs, "" where nothing is to be done about it. lights: rows of the lights it is about.
+    """
 
     subject: str
     problem: str
     remedy: str
+    kind: str = ""
+    lights: tuple[int, ...] = field(default=(), compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.subject}: {self.problem}; {self.remedy}"

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looking up light meshes, what they were made from, and tag ids, by what is stored in the file.
+
+Nothing is remembered between calls, so undo, renaming, duplicating, appending, linking and deleting cannot make an
+answer stale. Sources are known by a number (`vlm_id`) that goes with the object through renames; where copies of an
+object share it, or the object is linked and could not be given one, its name decides.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+import numpy.typing as npt
+
+from ..core.errors import InvalidInput
+from ..core.scene import UNTAGGED
+from .light_faces import read_faces
+from .names import (
+    ID_PROPERTY,
+    SCHEMA_PROPERTY,
+    SCHEMA_VERSION,
+    SOURCE_IDS_PROPERTY,
+    SOURCES_PROPERTY,
+    TAG_ATTRIBUTE,
+    TAG_PROPERTY,
+    is_light_mesh,
+)
+
+NO_ID = 0
+LARGEST_ID = 2**31 - 1
+
+
+def light_meshes(scene: Any) -> list[Any]:
+    """The light mesh objects of `scene`, in order of name."""
+    found = (thing for thing in scene.objects if thing.type == "MESH" and is_light_mesh(thing))
+    return sorted(found, key=lambda thing: thing.name)
+
+
+def chosen_light_meshes(context: Any) -> list[Any]:
+    """The light meshes that a tool works on: those in edit mode, or the selected ones."""
+    if context.mode == "EDIT_MESH":
+        things = list(context.objects_in_mode_unique_data)
+    else:
+        things = list(context.selected_objects)
+    return sorted((thing for thing in things if is_light_mesh(thing)), key=lambda thing: thing.name)
+
+
+def set_sources(thing: Any, names: Sequence[str], scene: Any) -> None:
+    """Remember the objects of `scene` that the light mesh was made from; those that can be written get an id."""
+    found = [scene.objects.get(name) for name in names]
+    thing[SOURCES_PROPERTY] = "\n".join(names)
+    thing[SOURCE_IDS_PROPERTY] = [NO_ID if source is None else ensure_id(source) for source in found]
+
+
+def source_names(thing: Any) -> list[str]:
+    """The names that the sources had when the light mesh was made, none where it was drawn by hand."""
+    return [name for name in str(thing.get(SOURCES_PROPERTY, "")).split("\n") if name]
+
+
+def sources(thing: Any, scene: Any) -> list[Any | None]:
+    """The objects of `scene` that the light mesh was made from, None for each that is gone."""
+    names = source_names(thing)
+    ids = [int(value) for value in thing.get(SOURCE_IDS_PROPERTY, ())]
+    ids += [NO_ID] * (len(names) - len(ids))
+    known: dict[int, list[Any]] = {}
+    for each in scene.objects:
+        if ID_PROPERTY in each and not is_light_mesh(each):
+            known.setdefault(int(each[ID_PROPERTY]), []).append(each)
+    return [_source(name, known.get(number, []), scene) for name, number in zip(names, ids, strict=False)]
+
+
+def _source(name: str, same_id: list[Any], scene: Any) -> Any | None:
+    if len(same_id) == 1:
+        return same_id[0]
+    named = [each for each in same_id if each.name == name]
+    if named or same_id:
+        return (named or sorted(same_id, key=lambda each: each.name))[0]
+    by_name = scene.objects.get(name)
+    # An object of that name with another id is another object.
+    return by_name if by_name is not None and not is_light_mesh(by_name) and ID_PROPERTY not in by_name else None
+
+
+def light_meshes_of(source: Any, scene: Any) -> list[Any]:
+    """The light meshes of `scene` that were made from the object `source`."""
+    return [thing for thing in light_meshes(scene) if source in sources(thing, scene)]
+
+
+def ensure_id(thing: Any) -> int:
+    """The id of an object, given now where it has none; NO_ID where it is linked and cannot be written.
+
+    The same file gives the same ids: they come from names.
+    """
+    if ID_PROPERTY in thing:
+        return int(thing[ID_PROPERTY])
+    if not is_local(thing):
+        return NO_ID
+    thing[ID_PROPERTY] = unused_id(thing.name)
+    return int(thing[ID_PROPERTY])
+
+
+def unused_id(name: str) -> int:
+    """An id that no object of the file has, made from `name`."""
+    taken = {int(each[ID_PROPERTY]) for each in bpy.data.objects if ID_PROPERTY in each}
+    number = zlib.crc32(name.encode()) % LARGEST_ID + 1
+    while number in taken:
+        number = number % LARGEST_ID + 1
+    return number
+
+
+def is_local(thing: Any) -> bool:
+    """Whether an object and its data belong to this file and can be changed."""
+    parts = [thing, thing.data] if getattr(thing, "data", None) is not None else [thing]
+    return all(part.library is None and part.override_library is None for part in parts)
+
+
+def require_editable(thing: Any) -> None:
+    """Raises InvalidInput where a light mesh cannot be changed: it is linked, overridden or of a later version."""
+    subject = f"light mesh {thing.name!r}"
+    if not is_local(thing):
+        raise InvalidInput(subject, "it is linked from another file", "make it local (Object > Relations > Make Local)")
+    version = int(thing[SCHEMA_PROPERTY])
+    if version > SCHEMA_VERSION:
+        remedy = "open it with the version of the extension that wrote it"
+        raise InvalidInput(subject, f"{SCHEMA_PROPERTY} is {version}, not {SCHEMA_VERSION}", remedy)
+
+
+def tags_of(thing: Any) -> npt.NDArray[np.int32]:
+    """The tag ids that a light mesh or a visible object carries, each once, UNTAGGED left out."""
+    found = [int(thing.get(TAG_PROPERTY, UNTAGGED))] if not is_light_mesh(thing) else []
+    if thing.type == "MESH":
+        found += np.unique(read_faces(thing, TAG_ATTRIBUTE)).tolist()
+    return np.array(sorted({tag for tag in found if tag != UNTAGGED}), np.int32)
+
+
+def new_tags(count: int, things: Iterable[Any] | None = None) -> npt.NDArray[np.int32]:
+    """(count,) int32: tag ids that none of `things` (all objects of the file by default) carries, ascending."""
+    used = [tags_of(thing) for thing in (bpy.data.objects if things is None else things)]
+    largest = max((int(tags.max()) for tags in used if len(tags)), default=0)
+    return np.arange(max(largest, 0) + 1, max(largest, 0) + 1 + count, dtype=np.int32)

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light meshes that an earlier version of the extension wrote, brought up to the present table of names.
+
+Version 1 knew its sources by name alone; version 2 gives them ids. Linked light meshes stay as they are: they are
+read in either form.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .light_meshes import is_local, light_meshes, set_sources, source_names
+from .names import SCHEMA_PROPERTY, SCHEMA_VERSION, SOURCES_PROPERTY
+
+
+def migrate_file() -> int:
+    """Bring all light meshes of the open file up to SCHEMA_VERSION; returns how many were older."""
+    return sum(_migrate(thing, scene) for scene in bpy.data.scenes for thing in light_meshes(scene))
+
+
+def _migrate(thing: Any, scene: Any) -> bool:
+    if not is_local(thing) or int(thing[SCHEMA_PROPERTY]) >= SCHEMA_VERSION:
+        return False
+    if SOURCES_PROPERTY in thing:
+        set_sources(thing, source_names(thing), scene)
+    thing[SCHEMA_PROPERTY] = SCHEMA_VERSION
+    return True
+
+
+@persistent
+def _after_load(*_: Any) -> None:
+    migrate_file()
+
+
+def register(undo: ExitStack) -> None:
+    """Migrate what is opened from now on; `undo` hears how to stop that."""
+    bpy.app.handlers.load_post.append(_after_load)
+    undo.callback(bpy.app.handlers.load_post.remove, _after_load)
