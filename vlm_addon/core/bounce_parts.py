@@ -7,21 +7,19 @@ names both, and each surface's light is counted once.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from .errors import InvalidInput
 from .light_mesh import VirtualLightMesh
 from .light_tree_bounds import triangle_areas
 from .scene import DIFFUSE, UNTAGGED, Float64, Material, Mesh, SceneSnapshot
+from .spans import parse_spans
 
 Bools = npt.NDArray[np.bool_]
 
 DYNAMIC, TAGGED = "dynamic", "tagged"
-_SPAN = re.compile(r"(\d{1,9})(?:\s*-\s*(\d{1,9}))?")
 
 
 @dataclass(frozen=True)
@@ -51,14 +49,7 @@ class Choice:
 
 def tag_spans(text: str) -> tuple[tuple[int, int], ...]:
     """The spans of tag ids that `text` names, such as "3, 5-8". Raises InvalidInput for anything else."""
-    spans = []
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        found = _SPAN.fullmatch(part)
-        first, last = (int(found[1]), int(found[2] or found[1])) if found else (UNTAGGED, UNTAGGED)
-        if not UNTAGGED < first <= last:
-            raise InvalidInput("tag ids", f"{part!r} is no tag id", "give numbers from 1 and spans, such as 3, 5-8")
-        spans.append((first, last))
-    return tuple(spans)
+    return parse_spans(text, "tag id", UNTAGGED + 1)
 
 
 def without_bounce(snapshot: SceneSnapshot, choice: Choice) -> SceneSnapshot:
