@@ -239,3 +239,23 @@ def test_light_meshes_that_cannot_be_used_are_named(make_plane, make_lights, cha
     change(make_lights(square_at(-0.1), [(0, 1, 2)], vlm_color=np.ones((1, 3))))
     with pytest.raises(InvalidInput, match=text):
         extract()
+
+
+def test_lights_lead_back_to_the_faces_they_are_stored_as(make_plane, make_lights):
+    make_plane()
+    make_lights(square_at(-0.1), [(0, 1, 2), (0, 2, 3)], name="b", vlm_color=np.ones((2, 3)))
+    make_lights(square_at(-0.2), [(0, 1, 2, 3)], name="a", vlm_color=np.ones((1, 3)))
+    found = extract()
+    assert found.origins.faces_by_object(range(len(found.light_mesh))) == {"a": [0], "b": pytest.approx([0, 1])}
+    by_height = found.light_mesh.corners[:, 0, 2] < -0.15
+    quad = found.origins.faces_by_object(np.flatnonzero(by_height))
+    assert by_height.sum() == 2 and list(quad) == ["a"]
+
+
+def test_lights_that_a_modifier_made_lead_back_to_no_face(make_plane, make_lights):
+    make_plane()
+    made = make_lights(square_at(-0.1), [(0, 1, 2), (0, 2, 3)], vlm_color=np.ones((2, 3)))
+    made.modifiers.new("Array", "ARRAY").count = 2
+    found = extract()
+    assert len(found.light_mesh) == 4
+    assert found.origins.faces_by_object(range(4)) == {}

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh, join, require_valid
-from ..core.scene import Float32, Float64, SceneSnapshot
+from ..core.scene import Float32, Float64, Int32, SceneSnapshot
 from .color_space import convert, working_to_rec709
 from .dynamics import is_dynamic
 from .evaluation import evaluate
@@ -36,11 +37,40 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
+class LightOrigins:
+    """Where the lights of a scene are stored. objects: names of the light meshes. owner: (n,) int32, row in objects.
+    faces: (n,) int32, the face of the stored mesh that each light is (a part of), -1 where modifiers made it or the
+    light mesh is linked."""
+
+    objects: tuple[str, ...]
+    owner: Int32
+    faces: Int32
+
+    def faces_by_object(self, lights: npt.ArrayLike) -> dict[str, Int32]:
+        """The stored faces of some lights, (k,) rows, by the name of their object, each once, ascending."""
+        rows = np.asarray(lights, np.int64)
+        rows = rows[self.faces[rows] >= 0]
+        return {
+            self.objects[at]: np.unique(self.faces[rows[self.owner[rows] == at]]) for at in np.unique(self.owner[rows])
+        }
+
+
+@dataclass(frozen=True)
 class Extraction:
-    """One evaluation of a scene: what it shows, and its virtual lights (None where it has none)."""
+    """One evaluation of a scene: what it shows; its virtual lights and where they are stored, None without any."""
 
     snapshot: SceneSnapshot
     light_mesh: VirtualLightMesh | None
+    origins: LightOrigins | None = None
+
+
+@dataclass(frozen=True)
+class _Read:
+    """The lights of one light mesh object, with the rows of LightOrigins."""
+
+    lights: VirtualLightMesh
+    name: str
+    faces: Int32
 
 
 def extract(options: ExtractOptions | None = None, depsgraph: Any = None) -> Extraction:
@@ -51,7 +81,7 @@ def extract(options: ExtractOptions | None = None, depsgraph: Any = None) -> Ext
     )
     light_mesh = _with_source_points(lights, snapshot, options, report)
     findings = dict.fromkeys((*snapshot.findings, *report.findings))
-    return Extraction(replace(snapshot, findings=tuple(findings)), light_mesh)
+    return Extraction(replace(snapshot, findings=tuple(findings)), light_mesh, _origins(lights) if lights else None)
 
 
 def extract_light_mesh(
@@ -69,22 +99,27 @@ def extract_light_mesh(
     options = options or ExtractOptions()
     report = report if report is not None else FindingList()
     lights = evaluate(
-        lambda graph: read_light_meshes(graph, report), options.viewport_levels, depsgraph, light_meshes=True
+        lambda graph: _read_light_meshes(graph, report), options.viewport_levels, depsgraph, light_meshes=True
     )
     return _with_source_points(lights, snapshot, options, report)
 
 
-def _both(depsgraph: Any, options: ExtractOptions) -> tuple[SceneSnapshot, list[VirtualLightMesh], FindingList]:
+def _both(depsgraph: Any, options: ExtractOptions) -> tuple[SceneSnapshot, list[_Read], FindingList]:
     report = FindingList()
-    return extract_from(depsgraph, options), read_light_meshes(depsgraph, report), report
+    return extract_from(depsgraph, options), _read_light_meshes(depsgraph, report), report
+
+
+def _origins(found: list[_Read]) -> LightOrigins:
+    owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(each.faces) for each in found])
+    return LightOrigins(tuple(each.name for each in found), owner, np.concatenate([each.faces for each in found]))
 
 
 def _with_source_points(
-    lights: list[VirtualLightMesh], snapshot: SceneSnapshot, options: ExtractOptions, report: FindingList
+    lights: list[_Read], snapshot: SceneSnapshot, options: ExtractOptions, report: FindingList
 ) -> VirtualLightMesh | None:
     if not lights:
         return None
-    light_mesh = join(lights)
+    light_mesh = join([each.lights for each in lights])
     samples, missed = find_source_points(light_mesh, snapshot.meshes, options.samples_per_light)
     if missed:
         problem = f"{missed} of {len(light_mesh)} lights have no visible surface in front of them"
@@ -94,7 +129,7 @@ def _with_source_points(
     return found
 
 
-def read_light_meshes(depsgraph: Any, report: FindingList) -> list[VirtualLightMesh]:
+def _read_light_meshes(depsgraph: Any, report: FindingList) -> list[_Read]:
     """The light meshes of a depsgraph, one per object or instance, without source points."""
     to_rec709 = working_to_rec709()
     found, seen = [], set()
@@ -106,7 +141,7 @@ def read_light_meshes(depsgraph: Any, report: FindingList) -> list[VirtualLightM
     for blender_object in _left_out(depsgraph, seen, report):
         matrix = np.array(blender_object.matrix_world, np.float64)
         found.append(_read_object(blender_object, matrix, to_rec709, report))
-    return [lights for lights in found if len(lights)]
+    return [each for each in found if len(each.lights)]
 
 
 def _left_out(depsgraph: Any, seen: set[str], report: FindingList) -> Iterator[Any]:
@@ -125,7 +160,7 @@ def _left_out(depsgraph: Any, seen: set[str], report: FindingList) -> Iterator[A
         yield evaluated
 
 
-def _read_object(blender_object: Any, matrix: Float64, to_rec709: Float64, report: FindingList) -> VirtualLightMesh:
+def _read_object(blender_object: Any, matrix: Float64, to_rec709: Float64, report: FindingList) -> _Read:
     owner = f"light mesh {blender_object.name!r}"
     version = blender_object[SCHEMA_PROPERTY]
     if not 1 <= version <= SCHEMA_VERSION:
@@ -140,7 +175,7 @@ def _read_object(blender_object: Any, matrix: Float64, to_rec709: Float64, repor
 
 def _read_lights(
     blender_object: Any, mesh: Any, matrix: Float64, owner: str, to_rec709: Float64, report: FindingList
-) -> VirtualLightMesh:
+) -> _Read:
     local = read_mesh(mesh, owner)
     if not len(local.triangles):
         raise InvalidInput(owner, "it has no faces", "add faces or delete it")
@@ -163,7 +198,8 @@ def _read_lights(
 
     mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
     lights = len(local.triangles)
-    return VirtualLightMesh(
+    stored = original.library is None and len(original.data.polygons) == count
+    read = VirtualLightMesh(
         vertices=local.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3],
         triangles=flipped(local.triangles) if mirrored else local.triangles,
         colour=tinted(color),
@@ -173,3 +209,4 @@ def _read_lights(
         dynamic=np.full(lights, bool(blender_object.get(DYNAMIC_PROPERTY, False)) or is_dynamic(original)),
         samples=unsampled(lights),
     )
+    return _Read(read, original.name, local.faces if stored else np.full(lights, -1, np.int32))
