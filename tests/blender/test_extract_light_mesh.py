@@ -249,7 +249,8 @@ def test_lights_lead_back_to_the_faces_they_are_stored_as(make_plane, make_light
     assert found.origins.faces_by_object(range(len(found.light_mesh))) == {"a": [0], "b": pytest.approx([0, 1])}
     by_height = found.light_mesh.corners[:, 0, 2] < -0.15
     quad = found.origins.faces_by_object(np.flatnonzero(by_height))
-    assert by_height.sum() == 2 and list(quad) == ["a"]
+    assert by_height.sum() == 2
+    assert list(quad) == ["a"]
 
 
 def test_lights_that_a_modifier_made_lead_back_to_no_face(make_plane, make_lights):
