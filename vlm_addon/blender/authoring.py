@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +17,9 @@ from ..light_grid_bake import check_lights
 from .availability import has_geometry, light_mesh_objects, rendered_objects
 from .engine import ENGINE_ID
 from .extract import ExtractOptions, extract_scene, require_camera, require_lights
+from .findings import list_findings
 from .light_grid_options import scene_grid_settings
-from .light_mesh_io import Extraction, extract
+from .light_mesh_io import Extraction, LightOrigins, extract, origins_of
 from .names import SOURCES_PROPERTY
 from .write_back import write_light_mesh
 
@@ -29,13 +30,14 @@ NAME = "VLM"
 class Made:
     """A bake and where it goes: the scene's name, the light mesh's name and the objects that it was made from.
 
-    name is None where the scene keeps the light meshes that it has.
+    name is None where the scene keeps the light meshes that it has, which are at `origins`.
     """
 
     bake: Bake
     scene: str
     name: str | None = None
     sources: tuple[str, ...] = ()
+    origins: LightOrigins | None = None
 
 
 def from_selection(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
@@ -65,7 +67,7 @@ def _work_on_scene(context: Any, found: Extraction, settings: BakeSettings) -> C
     if existing is None:
         sources = tuple(thing.name for thing in rendered_objects(context) if has_geometry(thing))
         return _work(snapshot, NAME, sources, settings)
-    return lambda progress: Made(bake(snapshot, existing, None, progress), snapshot.name)
+    return lambda progress: Made(bake(snapshot, existing, None, progress), snapshot.name, origins=found.origins)
 
 
 def _work(
@@ -79,11 +81,13 @@ def write(made: Made) -> str:
     scene = bpy.data.scenes.get(made.scene)
     if scene is None:
         raise InvalidInput(f"scene {made.scene!r}", "it is gone", "create the light mesh again")
-    list_findings(scene, (*_counted_twice(scene, made), *made.bake.findings))
+    findings = (*_counted_twice(scene, made), *made.bake.findings)
     count = lights(len(made.bake.light_mesh))
     if made.name is None or made.bake.creation is None:
+        list_findings(scene, findings, made.origins)
         return f"Kept the {count} that the scene has"
-    write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
+    written = write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
+    list_findings(scene, findings, origins_of(written))
     seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
     return f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s"
 
@@ -103,18 +107,13 @@ def _counted_twice(scene: Any, made: Made) -> list[Finding]:
 def check(context: Any) -> tuple[Finding, ...]:
     """What is wrong with the light meshes and the light grid of the scene, and what extraction had to approximate; also
     listed."""
+    for thing in context.objects_in_mode:
+        thing.update_from_editmode()
     found = extract()
     settings = scene_grid_settings(context.scene)
     findings = (*check_lights(found.snapshot, found.light_mesh, settings), *found.snapshot.findings)
-    list_findings(context.scene, findings)
+    list_findings(context.scene, findings, found.origins)
     return findings
-
-
-def list_findings(scene: Any, findings: Sequence[Finding]) -> None:
-    """Show the findings in the sidebar, in place of those before."""
-    scene.vlm.findings.clear()
-    for finding in findings:
-        scene.vlm.findings.add().text = str(finding)
 
 
 def render_picture(context: Any) -> None:
@@ -152,3 +151,8 @@ def allow(operator: Any, problem: str | None) -> bool:
 def lights(count: int) -> str:
     """A number of virtual lights in words."""
     return "1 virtual light" if count == 1 else f"{count:,} virtual lights"
+
+
+def faces(count: int) -> str:
+    """A number of faces in words."""
+    return "1 face" if count == 1 else f"{count:,} faces"

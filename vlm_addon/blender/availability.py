@@ -92,6 +92,13 @@ def check_problem(context: bpy.types.Context) -> str | None:
     return None
 
 
+def findings_problem(context: bpy.types.Context) -> str | None:
+    """Why there is no finding to look at, or None."""
+    if not len(context.scene.vlm.findings):
+        return "There are no findings: run Check first, or there is nothing wrong"
+    return None
+
+
 def light_scene_problem(context: bpy.types.Context) -> str | None:
     """Why the scene cannot be lit and rendered, or None."""
     if context.scene.camera is None:

@@ -109,6 +109,12 @@ def _both(depsgraph: Any, options: ExtractOptions) -> tuple[SceneSnapshot, list[
     return extract_from(depsgraph, options), _read_light_meshes(depsgraph, report), report
 
 
+def origins_of(thing: Any) -> LightOrigins:
+    """The origins of the lights of one light mesh of triangles, as `write_light_mesh` has just stored it."""
+    count = len(thing.data.polygons)
+    return LightOrigins((thing.name,), np.zeros(count, np.int32), np.arange(count, dtype=np.int32))
+
+
 def _origins(found: list[_Read]) -> LightOrigins:
     owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(each.faces) for each in found])
     return LightOrigins(tuple(each.name for each in found), owner, np.concatenate([each.faces for each in found]))

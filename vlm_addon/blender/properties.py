@@ -16,6 +16,8 @@ from ..core.simplify import SimplifySettings
 from ..render.frame_effects import SETTINGS as EFFECT_SETTINGS
 from ..render.frame_types import LIMITS, RenderSettings
 from ..render.technique import Technique, technique_by_name, technique_list
+from .findings import CLASSES as FINDING_CLASSES
+from .findings import VLM_PG_finding
 
 S = TypeVar("S")
 
@@ -104,18 +106,12 @@ def _title(name: str) -> str:
     return name.replace("_", " ").title()
 
 
-class VLM_PG_finding(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming of classes)
-    """One sentence of the last check."""
-
-    text: bpy.props.StringProperty(name="Finding")  # type: ignore[valid-type]
-
-
 def register_scene_settings(undo: ExitStack) -> None:
     """Give scenes the property `vlm`; `undo` hears how to take it away again."""
     groups = {technique.name: _settings_group(technique) for technique in technique_list()}
     effects = _effects_group()
     scene_group = _scene_group(groups, effects)
-    for cls in (VLM_PG_finding, effects, *filter(None, groups.values()), scene_group):
+    for cls in (*FINDING_CLASSES, effects, *filter(None, groups.values()), scene_group):
         bpy.utils.register_class(cls)
         undo.callback(bpy.utils.unregister_class, cls)
     pointer = bpy.props.PointerProperty(type=scene_group, name="Virtual Light Mesh")
