@@ -42,11 +42,32 @@ class Made:
 
 def from_selection(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the selected objects."""
-    sources = tuple(thing.name for thing in context.selected_objects if has_geometry(thing))
-    snapshot = extract_scene(ExtractOptions(objects=frozenset(sources)))
+    things = [thing for thing in context.selected_objects if has_geometry(thing)]
     active = context.active_object
-    named_after = active.name if active is not None and active.name in sources else sources[0]
-    return _work(snapshot, f"{NAME} {named_after}", sources, settings)
+    named_after = active if active in things else things[0]
+    return _from_objects(things, f"{NAME} {named_after.name}", settings)
+
+
+def from_collection(collection: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
+    """Work that makes a light mesh of the objects of a collection and of those in it.
+
+    Raises InvalidInput where none of them shows a surface in renders.
+    """
+    things = [thing for thing in collection.all_objects if has_geometry(thing) and not thing.hide_render]
+    if not things:
+        problem = "none of its objects shows a surface in renders"
+        raise InvalidInput(f"collection {collection.name!r}", problem, "put meshes into it, or choose another")
+    return _from_objects(things, f"{NAME} {collection.name}", settings)
+
+
+def from_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
+    """Work that makes one light mesh of all that the scene shows, whatever light meshes it has."""
+    return _from_objects([thing for thing in rendered_objects(context) if has_geometry(thing)], NAME, settings)
+
+
+def _from_objects(things: list[Any], name: str, settings: BakeSettings) -> Callable[[Progress], Made]:
+    sources = tuple(thing.name for thing in things)
+    return _work(extract_scene(ExtractOptions(objects=frozenset(sources))), name, sources, settings)
 
 
 def from_visible_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:

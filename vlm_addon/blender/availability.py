@@ -57,6 +57,24 @@ def selection_problem(context: bpy.types.Context) -> str | None:
     return _writing_problem(context) or authoring_problem()
 
 
+def collection_problem(context: bpy.types.Context) -> str | None:
+    """Why the active collection gives no light mesh, or None."""
+    collection = context.collection
+    if collection is None or not any(has_geometry(thing) for thing in collection.all_objects):
+        return "The active collection shows no surfaces: click one that holds meshes in the outliner"
+    return _writing_problem(context) or authoring_problem()
+
+
+def painting_problem(context: bpy.types.Context) -> str | None:
+    """Why there is no visible mesh to paint detail on, or None."""
+    thing = context.active_object
+    if thing is None or thing.type != "MESH" or is_light_mesh(thing):
+        return "Select the visible mesh first: detail is painted there, not on the light mesh"
+    if not is_local(thing):
+        return f"{thing.name} is linked from another file: make it local first"
+    return None
+
+
 def visible_scene_problem(context: bpy.types.Context) -> str | None:
     """Why the visible scene gives no light mesh, or None."""
     if not any(has_geometry(thing) for thing in rendered_objects(context)):

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Create a virtual light mesh from all that the scene shows."""
+
+from bpy.types import Operator
+
+from ..vlm_addon.bake import BakeSettings
+from ..vlm_addon.blender import authoring, availability
+from ..vlm_addon.blender.long_operator import LongOperator
+from ..vlm_addon.blender.properties import property_annotations, settings_from
+
+
+class VLM_OT_create_from_scene(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)
+    """Make virtual lights that stand for the bounce light of all that the scene shows, in one light mesh"""
+
+    bl_idname = "vlm.create_from_scene"
+    bl_label = "Create from Scene"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
+    __annotations__ = property_annotations(BakeSettings)
+
+    @classmethod
+    def poll(cls, context):
+        return authoring.allow(cls, availability.visible_scene_problem(context))
+
+    def prepare(self, context):
+        return authoring.from_scene(context, settings_from(self, BakeSettings))
+
+    def finish(self, context, result):
+        self.report({"INFO"}, authoring.write(result))
