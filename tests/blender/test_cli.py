@@ -141,6 +141,22 @@ def test_check_of_a_sound_light_mesh_is_silent_and_of_none_is_a_finding(lit_room
     assert len(json.loads(report.read_text())["findings"]) == 1
 
 
+def test_check_says_when_there_are_more_lights_than_the_budget(lit_room, tmp_path, capsys):
+    baked = tmp_path / "baked.blend"
+    run(capsys, "bake", lit_room, "--triangles", 12, "--save", baked)
+    open_scene(baked)
+    bpy.context.scene.vlm.light_budget = 11
+    over, enough = tmp_path / "over.blend", tmp_path / "enough.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(over))
+    bpy.context.scene.vlm.light_budget = 12
+    bpy.ops.wm.save_as_mainfile(filepath=str(enough))
+    report = tmp_path / "check.json"
+    assert run(capsys, "check", over, "--json", report)[0] == 3
+    (finding,) = json.loads(report.read_text())["findings"]
+    assert finding["problem"] == "its light meshes have 12 virtual lights, the budget is 11"
+    assert run(capsys, "check", enough)[0] == 0
+
+
 def test_bake_keeps_the_light_grid_it_was_asked_for_in_the_scene_and_in_a_file(lit_room, tmp_path, capsys):
     baked, grid, report = tmp_path / "baked.blend", tmp_path / "room.vlmgrid", tmp_path / "report.json"
     options = ["--range", 8, "--grid", 10, "--max-lights", 5]

@@ -132,9 +132,19 @@ def check(context: Any) -> tuple[Finding, ...]:
         thing.update_from_editmode()
     found = extract()
     settings = scene_grid_settings(context.scene)
-    findings = (*check_lights(found.snapshot, found.light_mesh, settings), *found.snapshot.findings)
+    budget = over_budget(context.scene, len(found.light_mesh or ()))
+    findings = (*check_lights(found.snapshot, found.light_mesh, settings), *budget, *found.snapshot.findings)
     list_findings(context.scene, findings, found.origins)
     return findings
+
+
+def over_budget(scene: Any, count: int) -> list[Finding]:
+    """A finding where `count` lights are more than the scene's budget."""
+    budget = scene.vlm.light_budget
+    if not 0 < budget < count:
+        return []
+    problem = f"its light meshes have {lights(count)}, the budget is {budget:,}"
+    return [Finding(f"scene {scene.name!r}", problem, "create them again with fewer, delete some or raise the budget")]
 
 
 def render_picture(context: Any) -> None:

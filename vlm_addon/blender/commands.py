@@ -17,7 +17,7 @@ from ..core.scene import Finding, SceneSnapshot
 from ..core.settings import from_mapping
 from ..light_grid_bake import GridBake, bake_light_grid, check_lights
 from ..terminal import TerminalProgress
-from .authoring import NAME
+from .authoring import NAME, over_budget
 from .availability import light_mesh_objects
 from .command_support import opened_scene, print_findings, require_apart, scene_report, write_json
 from .extract import ExtractOptions
@@ -133,8 +133,11 @@ def check_command(arguments: Namespace) -> int:
     require_apart(arguments.scene, [arguments.json] if arguments.json is not None else [])
     opened, found = opened_scene(arguments)
     settings = scene_grid_settings(bpy.context.scene)
-    findings = check_lights(found.snapshot, found.light_mesh, settings, TerminalProgress())
     light_count = len(found.light_mesh) if found.light_mesh is not None else 0
+    findings = (
+        *check_lights(found.snapshot, found.light_mesh, settings, TerminalProgress()),
+        *over_budget(bpy.context.scene, light_count),
+    )
     for finding in findings:
         print(f"finding: {finding}")
     for note in found.snapshot.findings:

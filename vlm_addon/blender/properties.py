@@ -181,6 +181,13 @@ def _scene_group(groups: dict[str, type | None], effects: type) -> type:
             max=LIMITS["world_lights"],
         ),
         "target_triangles": _property(target),
+        "light_budget": bpy.props.IntProperty(
+            name="Light Budget",
+            description="Virtual lights that all light meshes of the scene may have together: phase two takes "
+            "time in proportion to them, with a light grid to those near. Check says when there are more; 0: no limit",
+            default=0,
+            min=0,
+        ),
         "effects": bpy.props.PointerProperty(type=effects, name="Effects"),
         "findings": bpy.props.CollectionProperty(type=VLM_PG_finding, name="Findings of the last check"),
     }
