@@ -103,6 +103,16 @@ def light_faces_problem(context: bpy.types.Context) -> str | None:
     return f"{linked.name} is linked from another file: make it local first" if linked is not None else None
 
 
+def whole_light_mesh_problem(context: bpy.types.Context) -> str | None:
+    """Why a tool that changes light mesh objects as a whole has nothing to change, or None.
+
+    In edit mode it could not be undone: Blender's undo steps there hold meshes alone.
+    """
+    if context.mode != "OBJECT":
+        return "Leave this mode first (Tab): whole light meshes are changed in Object Mode"
+    return light_faces_problem(context)
+
+
 def check_problem(context: bpy.types.Context) -> str | None:
     """Why there is nothing to check, or None."""
     if not light_mesh_objects(context.scene):
