@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Squared distances between points and triangles, many pairs at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh_topology import Int64
+from .scene import Float64
+
+
+@dataclass(frozen=True)
+class FlatTriangles:
+    """Triangles, each in a frame of its own in which it is flat: cheaper than clamping barycentric coordinates in space.
+
+    origins: (n, 3) first corners, m. frames: (n, 3, 3) rows x, y, normal. flat: (n, 3, 2) corners in x and y.
+    """
+
+    origins: Float64
+    frames: Float64
+    flat: Float64
+
+    def squared_distances(self, points: Float64, triangle: Int64) -> Float64:
+        """(p,) squared distance in m² of each point (p, 3) to the triangle beside it."""
+        offset = points - self.origins[triangle]
+        x, y, height = np.einsum("ikj,ij->ki", self.frames[triangle], offset)
+        flat = self.flat[triangle]
+        best = np.full(len(points), np.inf)
+        inside = np.ones(len(points), bool)
+        for corner in range(3):
+            start, end = flat[:, corner], flat[:, (corner + 1) % 3]
+            side_x, side_y = end[:, 0] - start[:, 0], end[:, 1] - start[:, 1]
+            from_x, from_y = x - start[:, 0], y - start[:, 1]
+            square = side_x * side_x + side_y * side_y
+            along = (from_x * side_x + from_y * side_y) / np.where(square > 0, square, 1.0)
+            along = np.clip(along, 0.0, 1.0)
+            best = np.minimum(best, (from_x - along * side_x) ** 2 + (from_y - along * side_y) ** 2)
+            inside &= side_x * from_y - side_y * from_x >= 0
+        return np.where(inside, 0.0, best) + height * height
+
+
+def flat_triangles(corners: Float64) -> FlatTriangles:
+    """Of (n, 3, 3) corners, m; a triangle without area is the segment or point that it is."""
+    side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(side, other)
+    degenerate = ~(np.einsum("ij,ij->i", normal, normal) > 0)
+    longest = np.where((np.linalg.norm(side, axis=1) > 0)[:, None], side, other)
+    # Any frame that holds the segment will do.
+    normal[degenerate] = np.cross(longest[degenerate], np.roll(longest[degenerate], 1, axis=1) + [1.0, 2.0, 3.0])
+    x_axis = _unit(longest)
+    normal = _unit(normal)
+    frames = np.stack([x_axis, np.cross(normal, x_axis), normal], axis=1)
+    flat = np.einsum("nkj,ncj->nck", frames[:, :2], corners - corners[:, :1])
+    return FlatTriangles(corners[:, 0], frames, flat)
+
+
+def _unit(vectors: Float64) -> Float64:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
