@@ -1,145 +1,131 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar tab of the 3D view, in the order of work: create, check, render."""
+"""The sidebar tab of the 3D view, in the order of the work: create, draw, colour, tags, check, animate, bake."""
 
 from __future__ import annotations
 
-import textwrap
 from typing import Any
 
 import bpy
 
-from ..core.effect_rules import RULES
-from ..core.effects import OFF
-from ..core.settings import describe
-from ..render.frame_effects import SETTINGS as EFFECT_SETTINGS
-from ..render.technique import technique_by_name
 from . import authoring, availability
-from .engine import ENGINE_ID
-from .properties import effect_property, shown_settings, technique_group
+from .light_meshes import light_meshes
+from .names import HUE_PROPERTY, STRENGTH_PROPERTY, is_light_mesh
+from .panel_layout import SidebarPanel, hint, wrapped
 
-CATEGORY = "VLM"
-PIXELS_PER_CHARACTER = 7
-LABEL_SHARE = 0.38
-EFFECT_LABEL_SHARE = 0.62
 FINDINGS_SHOWN = 8
+BIG_BUTTON = 1.5
+
+COLOR_BUTTONS = (
+    ("vlm.fill_color", "BRUSH_DATA"),
+    ("vlm.multiply_color", "ADD"),
+    ("vlm.shift_hue", "COLOR"),
+    ("vlm.gradient_color", "IPO_LINEAR"),
+)
 
 
-class _SidebarPanel:
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
-
-
-class VLM_PT_create(_SidebarPanel, bpy.types.Panel):  # noqa: N801 (Blender's naming of classes)
-    """What makes a light mesh."""
+class VLM_PT_create(SidebarPanel, bpy.types.Panel):  # noqa: N801 (Blender's naming of classes)
+    """What makes a light mesh of what is visible."""
 
     bl_label = "Create"
 
     def draw(self, context: Any) -> None:
-        """Buttons, the one setting they share, and what the scene lacks."""
+        """Buttons, the settings they share, and what the scene lacks."""
         layout = self.layout
-        scene = context.scene
+        settings = context.scene.vlm
         column = layout.column()
-        column.scale_y = 1.5
-        button = column.operator("vlm.light_scene", icon="LIGHT_SUN")
-        button.target_triangles = scene.vlm.target_triangles
+        column.scale_y = BIG_BUTTON
+        column.operator("vlm.light_scene", icon="LIGHT_SUN").target_triangles = settings.target_triangles
         problem = availability.light_scene_problem(context)
-        _hint(layout, context, problem)
-        layout.prop(scene.vlm, "target_triangles")
-        button = layout.operator("vlm.create_from_selection", icon="MESH_ICOSPHERE")
-        button.target_triangles = scene.vlm.target_triangles
+        hint(layout, context, problem)
+        layout.prop(settings, "target_triangles")
+        column = layout.column(align=True)
+        for idname, icon in (
+            ("vlm.create_from_selection", "RESTRICT_SELECT_OFF"),
+            ("vlm.create_from_collection", "OUTLINER_COLLECTION"),
+            ("vlm.create_from_scene", "SCENE_DATA"),
+        ):
+            column.operator(idname, icon=icon).target_triangles = settings.target_triangles
         if problem is None:
-            _hint(layout, context, availability.selection_problem(context))
+            hint(layout, context, availability.selection_problem(context))
 
 
-class VLM_PT_check(_SidebarPanel, bpy.types.Panel):  # noqa: N801
+class VLM_PT_detail(SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """Where the next light mesh is fine, where it has nothing, and which lights it keeps."""
+
+    bl_label = "Detail"
+    bl_parent_id = "VLM_PT_create"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 (Blender's way)
+
+    def draw(self, context: Any) -> None:
+        """Painting on the visible mesh, locks on the light mesh."""
+        row = self.layout.row(align=True)
+        row.operator_menu_enum("vlm.paint_detail", "group", icon="WPAINT_HLT")
+        row = self.layout.row(align=True)
+        row.operator("vlm.lock_lights", icon="LOCKED")
+        row.operator("vlm.unlock_lights", icon="UNLOCKED")
+
+
+class VLM_PT_color(SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """Hue and strength of the bounce, apart from the visible materials."""
+
+    bl_label = "Color"
+
+    def draw(self, context: Any) -> None:
+        """What the selected lights can be given; factors of the active light mesh."""
+        layout = self.layout
+        problem = availability.light_faces_problem(context)
+        if problem is not None:
+            hint(layout, context, problem)
+            return
+        active = context.active_object
+        if active is not None and is_light_mesh(active):
+            column = layout.column(align=True)
+            for name, text in ((STRENGTH_PROPERTY, "Strength"), (HUE_PROPERTY, "Hue")):
+                if name in active:
+                    column.prop(active, f'["{name}"]', text=text)
+        column = layout.column(align=True)
+        for idname, icon in COLOR_BUTTONS:
+            column.operator(idname, icon=icon)
+
+
+class VLM_PT_check(SidebarPanel, bpy.types.Panel):  # noqa: N801
     """What the scene's light meshes are and what is wrong with them."""
 
     bl_label = "Check"
 
     def draw(self, context: Any) -> None:
-        """The light meshes with their size, the buttons and the findings of the last check."""
+        """The light meshes with their size, the budget, the buttons and the findings of the last check."""
         layout = self.layout
-        light_meshes = availability.light_mesh_objects(context.scene)
-        if not light_meshes:
+        scene = context.scene
+        found = light_meshes(scene)
+        if not found:
             layout.label(text="No light mesh yet", icon="INFO")
-        for thing in light_meshes:
+        for thing in found:
             layout.label(text=f"{thing.name}: {authoring.lights(len(thing.data.polygons))}", icon="MESH_DATA")
-        row = layout.row(align=True)
-        row.operator("vlm.bake", icon="FILE_REFRESH")
-        row.operator("vlm.check", icon="CHECKMARK")
-        findings = context.scene.vlm.findings
-        for finding in findings[:FINDINGS_SHOWN]:
-            _wrapped(layout.box().column(align=True), context, finding.text, "ERROR")
+        layout.prop(scene.vlm, "light_budget")
+        layout.operator("vlm.check", icon="CHECKMARK")
+        findings = scene.vlm.findings
+        for index, finding in enumerate(findings[:FINDINGS_SHOWN]):
+            self._finding(context, index, finding)
         if len(findings) > FINDINGS_SHOWN:
             layout.label(text=f"and {len(findings) - FINDINGS_SHOWN} more")
 
-
-class VLM_PT_render(_SidebarPanel, bpy.types.Panel):  # noqa: N801
-    """How F12 renders."""
-
-    bl_label = "Render"
-
-    def draw(self, context: Any) -> None:
-        """The engine, its settings and the render button."""
-        layout = self.layout
-        scene = context.scene
-        _labelled(layout, scene.render, "engine")
-        column = layout.column()
-        column.active = scene.render.engine == ENGINE_ID
-        _labelled(column, scene.vlm, "technique")
-        _technique_settings(column, scene)
-        column.prop(scene.vlm, "samples")
-        column.prop(scene.vlm, "world_lights")
-        layout.operator("render.render", text="Render Image", icon="RENDER_STILL")
-        _hint(layout, context, availability.rendering_problem())
+    def _finding(self, context: Any, index: int, finding: Any) -> None:
+        box = self.layout.box().column(align=True)
+        wrapped(box, context, finding.text, "ERROR")
+        if len(finding.marks):
+            row = box.row(align=True)
+            row.operator("vlm.select_offenders", text="Select", icon="RESTRICT_SELECT_OFF").index = index
 
 
-class VLM_PT_effects(_SidebarPanel, bpy.types.Panel):  # noqa: N801
-    """What frames run: each effect where the scene calls for it, unless the artist says otherwise."""
+class VLM_PT_bake(SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """Bringing the light meshes up to date."""
 
-    bl_label = "Effects"
-    bl_parent_id = "VLM_PT_render"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 (Blender's way)
+    bl_label = "Bake"
 
     def draw(self, context: Any) -> None:
-        """A choice for each effect, and the settings of those that are not off."""
-        group = context.scene.vlm.effects
-        for rule in RULES:
-            choice = getattr(group, rule.name)
-            column = self.layout.column(align=True)
-            _labelled(column, group, rule.name, EFFECT_LABEL_SHARE)
-            settings_type = EFFECT_SETTINGS.get(rule.name)
-            for info in describe(settings_type) if settings_type is not None and choice != OFF else ():
-                column.prop(group, effect_property(rule.name, info.name))
+        """The button."""
+        self.layout.operator("vlm.bake", icon="FILE_REFRESH")
 
 
-def _technique_settings(layout: Any, scene: Any) -> None:
-    technique = technique_by_name(scene.vlm.technique)
-    group = technique_group(scene, technique.name)
-    for name in shown_settings(group, technique.settings):
-        if isinstance(getattr(group, name), str):
-            _labelled(layout, group, name)
-        else:
-            layout.prop(group, name)
-
-
-def _labelled(layout: Any, owner: Any, name: str, label_share: float = LABEL_SHARE) -> None:
-    # a plain menu in a narrow sidebar cuts its label off
-    split = layout.split(factor=label_share)
-    split.label(text=owner.bl_rna.properties[name].name)
-    split.prop(owner, name, text="")
-
-
-def _hint(layout: Any, context: Any, sentence: str | None) -> None:
-    if sentence:
-        _wrapped(layout.column(align=True), context, sentence, "INFO")
-
-
-def _wrapped(layout: Any, context: Any, sentence: str, icon: str) -> None:
-    width = context.region.width / (context.preferences.system.ui_scale * PIXELS_PER_CHARACTER)
-    for number, line in enumerate(textwrap.wrap(sentence, max(int(width) - 5, 12))):
-        layout.label(text=line, icon=icon if number == 0 else "BLANK1")
-
-
-CLASSES = (VLM_PT_create, VLM_PT_check, VLM_PT_render, VLM_PT_effects)
+CLASSES = (VLM_PT_create, VLM_PT_detail, VLM_PT_color, VLM_PT_check, VLM_PT_bake)

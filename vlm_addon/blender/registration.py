@@ -8,7 +8,7 @@ from contextlib import ExitStack
 
 import bpy
 
-from . import authoring, cli_commands, engine, engine_panels, migration, panels, properties
+from . import authoring, cli_commands, engine, engine_panels, migration, panels, properties, render_panels
 from .render_process import KEPT
 
 PARTS = (migration,)
@@ -27,7 +27,7 @@ def register(operator_classes: Iterable[type]) -> None:
         undo.callback(KEPT.close)
         undo.callback(_stop_timer)
         properties.register_scene_settings(undo)
-        for cls in (*operator_classes, *panels.CLASSES, engine.VLM_RenderEngine):
+        for cls in (*operator_classes, *panels.CLASSES, *render_panels.CLASSES, engine.VLM_RenderEngine):
             bpy.utils.register_class(cls)
             undo.callback(bpy.utils.unregister_class, cls)
         for part in PARTS:
