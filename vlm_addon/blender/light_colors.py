@@ -18,7 +18,7 @@ from ..core.errors import InvalidInput
 from ..core.mesh_topology import Bool
 from ..core.scene import Float64
 from .light_faces import chosen_faces, read_faces, write_faces
-from .light_geometry import light_faces_in_world
+from .light_geometry import LightFaces, light_faces_in_world
 from .light_meshes import require_editable
 from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, HUE_PROPERTY, LOCK_ATTRIBUTE, STRENGTH_PROPERTY
 
@@ -123,11 +123,19 @@ def gradient(
 
 def chosen_middles(things: Sequence[Any]) -> Float64:
     """(n, 3) m: the middles of all chosen lights. Raises InvalidInput where there are none."""
-    middles = [light_faces_in_world(thing).middles[chosen_faces(thing)] for thing in things]
-    found = np.concatenate([np.zeros((0, 3)), *middles])
-    if not len(found):
+    return _of_chosen(things, lambda faces: faces.middles)
+
+
+def chosen_areas(things: Sequence[Any]) -> Float64:
+    """(n,) m²: the areas of all chosen lights. Raises InvalidInput where there are none."""
+    return _of_chosen(things, lambda faces: faces.areas)
+
+
+def _of_chosen(things: Sequence[Any], value: Callable[[LightFaces], Float64]) -> Float64:
+    found = [value(light_faces_in_world(thing))[chosen_faces(thing)] for thing in things]
+    if not sum(map(len, found)):
         raise InvalidInput("the selection", "no light is chosen", "select faces of the light mesh")
-    return found
+    return np.concatenate(found)
 
 
 def lock(things: Sequence[Any], locked: bool) -> int:

@@ -51,7 +51,7 @@ def find_source_points(
     filled = [mesh for mesh in meshes if len(mesh.triangles)]
     if not filled or not len(light_mesh):
         return own, len(light_mesh)
-    surface = _Surface(filled)
+    surface = VisibleSurface(filled)
     lights = np.repeat(np.arange(len(light_mesh)), np.diff(own.offsets))
     sizes = np.sqrt(light_mesh.areas)
     positions, normals, hit = surface.in_front(own.positions, own.normals.astype(np.float64), sizes[lights])
@@ -90,7 +90,7 @@ def _unit_normals(corners: Float64) -> Float64:
     return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
 
 
-class _Surface:
+class VisibleSurface:
     """All visible triangles, to shoot rays at. The tree is in float32, so it lies around the middle of the scene."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
@@ -107,11 +107,18 @@ class _Surface:
 
         points, directions (unit): (s, 3). sizes: (s,) m. Returns positions, normals and whether one was found.
         """
+        distances, triangles = self.triangles_in_front(points, directions, sizes)
+        return points + distances[:, None] * directions, self._normals[triangles], triangles >= 0
+
+    def triangles_in_front(
+        self, points: Float64, directions: Float64, sizes: Float64
+    ) -> tuple[Float64, npt.NDArray[np.int64]]:
+        """Signed distance (s,) m and triangle (s,) among those of all meshes in order, -1 where `in_front` has none."""
         distances, triangles = np.zeros(len(points)), np.full(len(points), -1)
         for sign in (1.0, -1.0):
             rows = np.flatnonzero(triangles < 0)
             distances[rows], triangles[rows] = self._first_alike(points[rows], directions[rows], sizes[rows], sign)
-        return points + distances[:, None] * directions, self._normals[triangles], triangles >= 0
+        return distances, triangles
 
     def _first_alike(
         self, points: Float64, directions: Float64, sizes: Float64, sign: float
@@ -142,9 +149,19 @@ class _Surface:
 
     def nearest(self, point: Float64, normal: Float64, reach: float) -> tuple[Float64, Float64] | None:
         """The nearest point within `reach` of a surface that faces like `normal`, and its normal."""
+        found = self.nearest_alike(point, normal, reach)
+        return None if found is None else (found[0], self._normals[found[1]])
+
+    def nearest_alike(self, point: Float64, normal: Float64, reach: float) -> tuple[Float64, int] | None:
+        """The nearest point within `reach` of a surface that faces like `normal`, and its triangle."""
         near = self._tree.find_nearest_range(Vector(point - self._middle), reach)
         similar = [hit for hit in near if self._normals[hit[2]] @ normal >= SIMILAR_COSINE]
         if not similar:
             return None
         position, _, triangle, _ = min(similar, key=lambda hit: hit[3])
-        return np.array(position, np.float64) + self._middle, self._normals[triangle]
+        return np.array(position, np.float64) + self._middle, triangle
+
+    def nearest_point(self, point: Float64) -> tuple[Float64, int]:
+        """The nearest point of all surfaces, and its triangle."""
+        position, _, triangle, _ = self._tree.find_nearest(Vector(point - self._middle))
+        return np.array(position, np.float64) + self._middle, triangle
