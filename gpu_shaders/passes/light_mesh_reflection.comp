@@ -55,7 +55,6 @@ bool is_glossy_to_eye(Surface surface) {
     return reflector.alpha > 0.0 && reflects && dot(surface.shading_normal, to_camera(surface.position)) > 0.0;
 }
 
-// A tagged light leaves out the surfaces of its own tag (seed 002, 3.4).
 #define ADD_MEMBERS(CLASS, SEEN) \
     for (int word = 0; word < WORDS; ++word) { \
         uint bits = members[CLASS * WORDS + word]; \
@@ -65,8 +64,8 @@ bool is_glossy_to_eye(Surface surface) {
             VirtualLight light = lights[i]; \
             vec3 a = light.v0 - position, b = light.v1 - position, c = light.v2 - position; \
             vec3 centre = (a + b + c) * (1.0 / 3.0); \
-            bool is_own = light.tag_id != UNTAGGED && light.tag_id == surface.tag_id; \
-            vec3 radiance = is_own ? vec3(0.0) : radiosities[i].rgb * INVERSE_PI; \
+            bool is_left_out = LEAVES_OUT(light.tag_id, surface.tag_id); \
+            vec3 radiance = is_left_out ? vec3(0.0) : radiosities[i].rgb * INVERSE_PI; \
             sum += radiance * (SEEN); \
         } \
     }

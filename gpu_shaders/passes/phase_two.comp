@@ -76,7 +76,7 @@ void classify(PointGroup group, uint first, uint end) {
             vec3 radiosity = radiosities[i].rgb; \
             for (int k = 0; k < PIXELS; ++k) { \
                 float factor = WEIGHT(i, positions[k]) * FORM_FACTOR; \
-                meet(k, i, IS_OWN_LIGHT(light.tag_id, k) ? vec3(0.0) : factor * radiosity); \
+                meet(k, i, IS_LEFT_OUT(light.tag_id, k) ? vec3(0.0) : factor * radiosity); \
             } \
         } \
     }

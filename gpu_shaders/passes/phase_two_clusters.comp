@@ -77,7 +77,7 @@ void main() {
                 for (int k = 0; k < PIXELS; ++k) {
                     float factor = cluster_weight(node, cluster, positions[k])
                         * cluster_factor(node, cluster, positions[k], normals[k]);
-                    meet(k, PICKED_CLUSTER | i, IS_OWN_LIGHT(cluster.tag_id, k) ? vec3(0.0) : factor * cluster.power);
+                    meet(k, PICKED_CLUSTER | i, IS_LEFT_OUT(cluster.tag_id, k) ? vec3(0.0) : factor * cluster.power);
                 }
             }
         }

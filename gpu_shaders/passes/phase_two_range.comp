@@ -32,7 +32,7 @@ void meet_light(uint i, int k) {
     VirtualLight light = lights[i];
     float factor = triangle_form_factor(
         positions[k], normals[k], light.v0, light.v1, light.v2, light.area_vector, light.bounding_radius);
-    meet(k, i, IS_OWN_LIGHT(light.tag_id, k) ? vec3(0.0) : factor * radiosities[i].rgb);
+    meet(k, i, IS_LEFT_OUT(light.tag_id, k) ? vec3(0.0) : factor * radiosities[i].rgb);
 }
 
 // After the `found`th light.

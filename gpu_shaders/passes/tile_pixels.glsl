@@ -3,6 +3,7 @@
 #ifndef PASSES_TILE_PIXELS
 #define PASSES_TILE_PIXELS
 #include "passes/gbuffer_samplers.glsl"
+#include "passes/light_tags.glsl"
 #include "lib/light_classes.glsl"
 
 #define GROUP_SIZE (GROUP_SIDE * GROUP_SIDE)
@@ -22,11 +23,11 @@ vec3 normals[PIXELS];
 int tag_ids[PIXELS];
 bool shown[PIXELS];
 
-// Whether a light of a tag leaves out the k-th pixel's surface (seed 002, 3.4).
+// Whether a light of a tag leaves out the k-th pixel's surface.
 #ifdef NO_TAGS
-#define IS_OWN_LIGHT(TAG, K) false
+#define IS_LEFT_OUT(TAG, K) false
 #else
-#define IS_OWN_LIGHT(TAG, K) ((TAG) != UNTAGGED && (TAG) == tag_ids[K])
+#define IS_LEFT_OUT(TAG, K) LEAVES_OUT(TAG, tag_ids[K])
 #endif
 
 ivec2 pixel_at(uint tile, int k) {

@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from .form_factor import paired_form_factor
 from .light_clusters import FADE, LightClusters, cluster_irradiance
+from .light_links import leaves_out
 from .light_mesh import VirtualLightMesh
 from .light_tree import LightTree
 from .light_tree_bounds import facing_height, horizon_height
-from .scene import UNTAGGED, Float64, Int32
+from .scene import Float64, Int32
 
 Indices = npt.NDArray[np.intp]
 Int64 = npt.NDArray[np.int64]
@@ -98,10 +99,11 @@ def cut_irradiance(
     normals: Float64,
     point_tags: Int32,
 ) -> CutIrradiance:
-    """At points with unit normals. radiosity: (n, 3) W/m². point_tags: (p,); lights of a point's own tag give nothing.
+    """At points with unit normals. radiosity: (n, 3) W/m². point_tags: (p,); lights that leave a
+    point's tag out give nothing.
 
-    Subtrees without power, of the own tag, that face away or lie under the horizon are left out; they give exactly
-    nothing, so that the result is the same as without leaving them out.
+    Subtrees without power, that leave the point out, face away or lie under the horizon are not walked; they give
+    exactly nothing, so that the result is the same as if they were.
     """
     result, evaluated = np.zeros((len(points), 3)), np.zeros(len(points), np.int64)
     visited = np.zeros(len(points), np.int64)
@@ -112,7 +114,8 @@ def cut_irradiance(
         def nothing(
             point: Indices, cluster: Indices, p: Float64 = at_points, n: Float64 = at_normals, t: Int32 = at_tags
         ) -> Bools:
-            return _gives_nothing(tree, clusters, cluster, p[point], n[point], t[point])
+            left_out = leaves_out(light_mesh.links, tree.tag_ids[cluster], t[point])
+            return left_out | _gives_nothing(tree, clusters, cluster, p[point], n[point])
 
         cut = light_cut(tree, clusters.window, at_points, nothing)
         at, of = cut.light_points, cut.lights
@@ -130,11 +133,11 @@ def cut_irradiance(
 
 
 def _gives_nothing(
-    tree: LightTree, clusters: LightClusters, cluster: Indices, points: Float64, normals: Float64, tags: Int32
+    tree: LightTree, clusters: LightClusters, cluster: Indices, points: Float64, normals: Float64
 ) -> Bools:
-    """(m,) whether no light of a cluster lights a point, by its power, its tag, the way it faces or where it lies."""
+    """(m,) whether no light of a cluster lights a point, by its power, the way it faces or where it lies."""
     shapes = tree.shapes.take(cluster)
-    nothing = (clusters.power[cluster] <= 0.0) | ((tags != UNTAGGED) & (tree.tag_ids[cluster] == tags))
+    nothing = clusters.power[cluster] <= 0.0
     nothing |= facing_height(shapes, points) <= 0.0
     return np.asarray(nothing | (horizon_height(shapes, points, normals) <= 0.0))
 

@@ -213,7 +213,7 @@ class LightGrid:
     def candidates(self, points: npt.ArrayLike) -> Candidates:
         """What lights (p, 3) points, m. Raises InvalidInput for another shape or points that are not finite.
 
-        Tags are not looked at: whoever shades leaves out what has the tag of the surface.
+        Tags are not looked at: whoever shades leaves out what `light_links.leaves_out` says.
         """
         array = finite_points(points)
         lights, clusters = [_Pairs.none()], [_Pairs.none()]

@@ -13,10 +13,11 @@ from .form_factor import polygon_form_factor
 from .grid_frame import OUTSIDE
 from .light_cut import cut_irradiance
 from .light_grid import LightGrid, LitTree, usable_radiosity
+from .light_links import leaves_out
 from .light_mesh import VirtualLightMesh
 from .metrics import point_error
 from .range_grid import RangeGrid
-from .scene import UNTAGGED, Float64
+from .scene import Float64
 from .surface_points import SurfacePoints
 
 Bools = npt.NDArray[np.bool_]
@@ -27,7 +28,7 @@ _PAIRS_PER_BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class GridError:
-    """Irradiance of points, (p, 3) float64 in W/m² each, without lights of the points' own tags.
+    """Irradiance of points, (p, 3) float64 in W/m² each, without the lights that leave the points' tags out.
 
     full: from all lights. found: what the grid gives. in_range: in range mode, from the lights that reach the point's
     cell, whether or not its list has room; in the other mode the same as `found`.
@@ -91,7 +92,7 @@ def grid_error(
     for block in _blocks(len(points.positions), len(light_mesh)):
         positions, tags = points.positions[block], points.tag_ids[block]
         factors = polygon_form_factor(positions, points.normals[block], light_mesh.corners)
-        factors[(tags[:, None] != UNTAGGED) & (tags[:, None] == light_mesh.tag_ids)] = 0.0
+        factors[leaves_out(light_mesh.links, light_mesh.tag_ids, tags[:, None])] = 0.0
         full[block] = factors @ radiosity
         if listed is not None:
             kept = np.zeros(factors.shape, bool)

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import numpy.typing as npt
 
 from .errors import InvalidInput
+from .light_links import make_links, no_links, require_links
 from .scene import Float32, Float64, Int32
 
 
@@ -33,7 +34,8 @@ class VirtualLightMesh:
     vertices: (v, 3) float64, m. triangles: (n, 3) int32, emitting on their counter-clockwise side. colour: (n, 3)
     float32, diffuse reflectance times the artist's multiplier, non-negative, any size. emission: (n, 3) float32,
     W/m². strength: (n,) float32, makes up for area lost in simplifying and insetting. tag_ids: (n,) int32, 0 for
-    none. dynamic: (n,) bool. samples: where phase one measures.
+    none. dynamic: (n,) bool. samples: where phase one measures. links: (k, 2) int32, sorted pairs (light tag, receiver
+    tag) as `light_links.make_links` gives them: lights of the first id leave out surfaces of the second, too.
 
     Radiosity of a light: strength * (emission + colour * irradiance).
     """
@@ -46,6 +48,7 @@ class VirtualLightMesh:
     tag_ids: Int32
     dynamic: npt.NDArray[np.bool_]
     samples: SourceSamples
+    links: Int32 = field(default_factory=no_links)
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -89,7 +92,9 @@ class VirtualLightMesh:
         )
         rows = {name: getattr(self, name)[chosen] for name in ("colour", "emission", "strength", "tag_ids", "dynamic")}
         triangles = corners.reshape(-1, 3).astype(np.int32)
-        return VirtualLightMesh(vertices=self.vertices[used], triangles=triangles, samples=samples, **rows)
+        return VirtualLightMesh(
+            vertices=self.vertices[used], triangles=triangles, samples=samples, links=self.links, **rows
+        )
 
 
 def empty_light_mesh() -> VirtualLightMesh:
@@ -110,7 +115,7 @@ def empty_light_mesh() -> VirtualLightMesh:
 
 
 def join(light_meshes: list[VirtualLightMesh]) -> VirtualLightMesh:
-    """All lights of several meshes as one, in order."""
+    """All lights of several meshes as one, in order; each link holds for all of them."""
     parts = [part for part in light_meshes if len(part)]
     if not parts:
         return empty_light_mesh()
@@ -128,7 +133,10 @@ def join(light_meshes: list[VirtualLightMesh]) -> VirtualLightMesh:
         weights=np.concatenate([part.samples.weights for part in parts]),
         offsets=np.concatenate([*offsets, sample_starts[-1:]]).astype(np.int32),
     )
-    return VirtualLightMesh(triangles=np.concatenate(triangles).astype(np.int32), samples=samples, **joined)
+    links = make_links(np.concatenate([part.links for part in parts]))
+    return VirtualLightMesh(
+        triangles=np.concatenate(triangles).astype(np.int32), samples=samples, links=links, **joined
+    )
 
 
 def require_valid(light_mesh: VirtualLightMesh) -> None:
@@ -136,7 +144,7 @@ def require_valid(light_mesh: VirtualLightMesh) -> None:
     count = len(light_mesh)
     for field_ in fields(light_mesh):
         values = getattr(light_mesh, field_.name)
-        if field_.name in ("vertices", "samples"):
+        if field_.name in ("vertices", "samples", "links"):
             continue
         if len(values) != count:
             problem = f"{len(values)} rows for {count} lights"
@@ -159,3 +167,4 @@ def require_valid(light_mesh: VirtualLightMesh) -> None:
     if len(light_mesh.samples.offsets) != count + 1:
         problem = f"{len(light_mesh.samples.offsets) - 1} groups for {count} lights"
         raise InvalidInput("light mesh samples", problem, "sample every light")
+    require_links(light_mesh.links)

@@ -12,11 +12,12 @@ import numpy.typing as npt
 from .form_factor import paired_form_factor
 from .light_clusters import LightClusters, cluster_error
 from .light_cut import cut_irradiance, light_cut
+from .light_links import leaves_out
 from .light_mesh import VirtualLightMesh
 from .light_tree import LightTree
 from .light_tree_bounds import facing_height
 from .metrics import point_error, within_tolerance
-from .scene import UNTAGGED, Float64, Int32
+from .scene import Float64, Int32
 
 Structure = tuple[LightTree, LightClusters]
 
@@ -72,7 +73,7 @@ def tree_errors(
 def full_irradiance(
     light_mesh: VirtualLightMesh, radiosity: Float64, points: Float64, normals: Float64, point_tags: Int32
 ) -> Float64:
-    """(p, 3) W/m² from all lights but those of a point's own tag, to some 1e-4 of itself.
+    """(p, 3) W/m² from all lights but those that leave a point's tag out, to some 1e-4 of itself.
 
     Lights that are far, and wholly above the horizon, are taken at the midpoints of their edges; the others exactly.
     """
@@ -85,8 +86,8 @@ def full_irradiance(
     for start in range(0, len(points), rows):
         block = slice(start, start + rows)
         may = _may_light(points[block], normals[block], corners)
-        own = (tags != UNTAGGED) & (point_tags[block][:, None] == tags)
-        at, of = np.nonzero(may & ~own)
+        left_out = leaves_out(light_mesh.links, tags, point_tags[block][:, None])
+        at, of = np.nonzero(may & ~left_out)
         if len(at):
             factors = _form_factors(points[block][at], normals[block][at], corners[of])
             for channel in range(3):

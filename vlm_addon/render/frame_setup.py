@@ -23,6 +23,7 @@ from .frame_types import RenderSettings, require_in_range
 from .kept import Kept
 from .kept_geometry import kept_geometry
 from .lamp_shadows import LampShadows, StillLamps
+from .link_table import LIGHT_LINKS
 from .local_space import LocalSpace, is_fine_enough, make_local_space, make_still_space
 from .picture_shares import direct_world_lights
 from .shadow_casters import ShadowCasters
@@ -102,7 +103,7 @@ def _on_device(
     """The scene `lit`, with the lights of its world, as passes and techniques see it, and its camera in local space:
     from here on nothing is in world space but what is read back."""
     device, kept, settings, plan = request.device, request.kept, request.settings, planner.plan
-    context, shaders = device.context, device.shaders.with_common(_plan_defines(plan))
+    context, shaders = device.context, device.shaders.with_common(_plan_defines(plan, request.light_mesh))
     space = make_local_space(lit)
     local, camera = _localised(space, lit)
     step(request.progress, 0.0, "geometry")
@@ -167,10 +168,15 @@ def _caster_space(world: SceneSnapshot, space: LocalSpace) -> LocalSpace:
     return still if is_fine_enough(still, world.camera) else space
 
 
-def _plan_defines(plan: EffectPlan) -> dict[str, int | float | bool | str]:
+def _plan_defines(plan: EffectPlan, light_mesh: VirtualLightMesh | None) -> dict[str, int | float | bool | str]:
     """Of all shaders of a frame: what is not called for is not in them."""
     absent = {"ALL_DIFFUSE": "layered_materials", "NO_TAGS": "light_tags"}
-    return {name: True for name, effect in absent.items() if not plan.runs(effect)}
+    defines: dict[str, int | float | bool | str] = {
+        name: True for name, effect in absent.items() if not plan.runs(effect)
+    }
+    if light_mesh is not None and len(light_mesh.links):
+        defines[LIGHT_LINKS] = True
+    return defines
 
 
 def _casting(lights: Sequence[Light], plan: EffectPlan) -> tuple[Light, ...]:

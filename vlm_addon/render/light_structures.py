@@ -71,7 +71,7 @@ class LightStructures:
         """
         digests = self._kept.digests
         surfaces = digests.of([[mesh.positions, mesh.triangles, mesh.tag_ids] for mesh in snapshot.meshes])
-        shape = [light_mesh.vertices, light_mesh.triangles, light_mesh.tag_ids, light_mesh.dynamic]
+        shape = [light_mesh.vertices, light_mesh.triangles, light_mesh.tag_ids, light_mesh.links, light_mesh.dynamic]
         key = digests.of(surfaces, shape, radiosity, tolerance)
 
         def make() -> SceneTrees:
@@ -92,7 +92,8 @@ class LightStructures:
                 shapes[kind] = lights_hash(light_mesh, chosen, TOLERANCE)
                 build = partial(build_light_tree, light_mesh, chosen)
                 trees[kind] = self._kept.get(f"{kind}_tree", shapes[kind], build)
-        state = content_hash([*shapes.values(), radiosity, probes.positions, probes.normals, probes.tag_ids])
+        judged_at = (probes.positions, probes.normals, probes.tag_ids)
+        state = content_hash([*shapes.values(), radiosity, light_mesh.links, *judged_at])
         inputs = list(trees.values()), light_mesh, values
         mean = self._kept.get("scale", state, lambda: mean_irradiance(*inputs, probes))
         judge = partial(window_factor, *inputs, tolerance, mean, probes)

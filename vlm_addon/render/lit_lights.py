@@ -33,7 +33,7 @@ def scene_lights(scene: SceneInputs) -> GpuVirtualLights:
     assert scene.light_mesh is not None
     assert scene.world_lights is not None
     mesh = scene.world_lights
-    key = scene.kept.digests.of(mesh.vertices, mesh.triangles, mesh.tag_ids, mesh.strength, scene.space)
+    key = scene.kept.digests.of(mesh.vertices, mesh.triangles, mesh.tag_ids, mesh.links, mesh.strength, scene.space)
     make = partial(GpuVirtualLights, scene.context, scene.light_mesh, scene.geometry.origin)
     return scene.kept.several(VIRTUAL_LIGHTS, key, make)
 

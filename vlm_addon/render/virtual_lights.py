@@ -11,13 +11,14 @@ from ..core.errors import DeviceError
 from ..core.light_mesh import VirtualLightMesh
 from ..core.scene import Float64
 from .gpu_layout import CONSTANTS, VIRTUAL_LIGHT
+from .link_table import LinkTable
 
 if TYPE_CHECKING:
     import moderngl
 
 
 class GpuVirtualLights:
-    """One VirtualLight record for each triangle of a light mesh, in order, relative to a local origin."""
+    """One VirtualLight record for each triangle of a light mesh, relative to a local origin, and its links."""
 
     def __init__(self, context: moderngl.Context, light_mesh: VirtualLightMesh, origin: Float64) -> None:
         """origin: (3,) float64, world space. Raises DeviceError where the device's blocks are too small."""
@@ -27,10 +28,13 @@ class GpuVirtualLights:
             most = limit // VIRTUAL_LIGHT.dtype.itemsize
             raise DeviceError(f"{self.count:,} virtual lights; the device holds {most:,}; bake fewer")
         self._buffer = context.buffer(virtual_light_records(light_mesh, origin).tobytes() or bytes(16))
+        self._links = LinkTable(context, light_mesh.links) if len(light_mesh.links) else None
 
     def bind(self) -> None:
-        """Binds the records to VIRTUAL_LIGHT_BINDING."""
+        """Binds the records to VIRTUAL_LIGHT_BINDING, and the links, if there are any, to LINK_UNIT."""
         self._buffer.bind_to_storage_buffer(int(CONSTANTS["VIRTUAL_LIGHT_BINDING"]))
+        if self._links is not None:
+            self._links.bind()
 
 
 def virtual_light_records(light_mesh: VirtualLightMesh, origin: Float64) -> np.ndarray:

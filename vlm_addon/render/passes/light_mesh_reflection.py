@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from ...core.ltc import LEAST_COSINE
 from ...core.progress import Progress, step
-from ...core.scene import UNTAGGED
 from ..albedo_texture import AlbedoTexture
 from ..gpu_layout import CONSTANTS
 from ..ltc_texture import LtcTexture
@@ -15,7 +14,7 @@ from ..shader_library import ShaderLibrary, set_uniforms
 from ..view import View
 from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
-from .phase_two import IrradianceImage, bind_lights, entry_runs
+from .phase_two import TAG_DEFINES, IrradianceImage, bind_lights, entry_runs
 from .tile_bounds import TILE_DEFINES, TileBoundsPass
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ class LightMeshReflectionPass:
         self._image = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
         self._albedo, self._table = AlbedoTexture(context), LtcTexture(context)
-        defines = {**TILE_DEFINES, **LTC_DEFINES, "UNTAGGED": UNTAGGED, "LTC_TABLE_UNIT": LTC_TABLE_UNIT}
+        defines = {**TILE_DEFINES, **LTC_DEFINES, **TAG_DEFINES, "LTC_TABLE_UNIT": LTC_TABLE_UNIT}
         self._shader = shaders.compute("passes/light_mesh_reflection.comp", defines)
 
     def render(
@@ -49,8 +48,9 @@ class LightMeshReflectionPass:
     ) -> moderngl.Texture:
         """Radiance in W/(m² sr), RGBA32F with w 0; 0 where no surface shows and on surfaces without a specular layer.
 
-        radiosity: one vec4 a light, rgb in W/m². Lights and surfaces of the same non-zero tag id leave each other
-        out. `progress` hears of each dispatch and may cancel. The next call overwrites the texture.
+        radiosity: one vec4 a light, rgb in W/m². Lights leave out surfaces as
+        core.light_links.leaves_out says. `progress` hears of each dispatch and may cancel. The next call overwrites
+        the texture.
         """
         tiles = self._tile_bounds.render(gbuffer)
         self._image.clear()

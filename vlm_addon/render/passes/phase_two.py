@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ...core.progress import Progress, step
 from ...core.scene import UNTAGGED
 from ..gpu_layout import CONSTANTS
+from ..link_table import LINK_DEFINES
 from ..shader_library import Defines, ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .baked_pixels import PixelVisibility
@@ -27,7 +28,8 @@ MIN_LIGHTS_PER_DISPATCH = 64
 # Mesa's software renderers end all loops of an invocation after 65,535 iterations together, without a word; a light
 # takes one, and one more for each pixel of the invocation.
 MAX_LIGHTS_PER_DISPATCH = 8192
-PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, "UNTAGGED": UNTAGGED, "PICKS": False, "BAKED": False}
+TAG_DEFINES = {**LINK_DEFINES, "UNTAGGED": UNTAGGED}
+PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, **TAG_DEFINES, "PICKS": False, "BAKED": False}
 
 
 class IrradianceImage:
@@ -87,8 +89,9 @@ class PhaseTwoPass(LightSumPass):
     ) -> moderngl.Texture:
         """Irradiance in W/m² on the shading normal's side of each pixel, RGBA32F; 0 where no surface shows.
 
-        radiosity: one vec4 a light, rgb in W/m². Lights and surfaces of the same non-zero tag id leave each other
-        out. `progress` hears of each dispatch and may cancel. The next call overwrites the texture.
+        radiosity: one vec4 a light, rgb in W/m². Lights leave out surfaces as
+        core.light_links.leaves_out says. `progress` hears of each dispatch and may cancel. The next call overwrites
+        the texture.
         """
         self._irradiance.clear()
         most = MAX_LIGHTS_PER_DISPATCH
