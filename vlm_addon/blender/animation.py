@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the operators of animation do with the selected light meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .availability import has_geometry
+from .follow_rig import is_following
+from .follow_source import AUTO, Following, follow_sources, require_followable, stop_following
+from .light_meshes import chosen_light_meshes, is_local, require_editable
+
+MILLIMETRES = 1000.0
+
+
+def follow_problem(context: Any) -> str | None:
+    """Why no light mesh can follow anything, or None."""
+    return _selection_problem(context)
+
+
+def free_problem(context: Any) -> str | None:
+    """Why no light mesh can be freed, or None."""
+    problem = _selection_problem(context)
+    if problem is None and not any(map(is_following, chosen_light_meshes(context))):
+        return "No selected light mesh follows its source"
+    return problem
+
+
+def follow(context: Any, way: str = AUTO) -> list[tuple[str, str]]:
+    """Let the selected light meshes follow their sources, or the other selected objects where there are any.
+
+    Returns reports as (level, sentence). Raises VlmError before anything is changed.
+    """
+    things = chosen_light_meshes(context)
+    others = [thing for thing in context.selected_objects if has_geometry(thing)]
+    for thing in things:
+        require_followable(thing, context, others)
+    done = [entry for thing in things for entry in follow_sources(thing, context, others, way)]
+    return [_report(entry) for entry in done]
+
+
+def free(context: Any) -> int:
+    """Free the selected light meshes; returns how many followed something. Raises VlmError."""
+    things = chosen_light_meshes(context)
+    for thing in things:
+        require_editable(thing)
+    return sum(stop_following(thing, context) for thing in things)
+
+
+def _selection_problem(context: Any) -> str | None:
+    if context.mode != "OBJECT":
+        return "Leave this mode first (Tab): light meshes are bound to their sources in Object Mode"
+    chosen = chosen_light_meshes(context)
+    if not chosen:
+        return "Select a light mesh (collection Virtual Light Meshes)"
+    linked = next((thing for thing in chosen if not is_local(thing)), None)
+    return f"{linked.name} is linked from another file: make it local first" if linked is not None else None
+
+
+def _report(entry: Following) -> tuple[str, str]:
+    how = f"{entry.light_mesh} follows {entry.source} by its {entry.way.lower()}"
+    distance = f"{entry.vertices} vertices, {MILLIMETRES * entry.distance:.2g} mm from it on average"
+    if not entry.note:
+        return "INFO", f"{how}: {distance}"
+    return "WARNING", f"{how}: {distance}; {entry.note}"
