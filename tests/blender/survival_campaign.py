@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random sequences of our operators and Blender's in one Blender, with everything checked after each step.
+
+Run by test_survival.py: `python survival_campaign.py FOLDER --first SEED --sequences N --steps N`. Writes
+FOLDER/campaign.json: failures (each with the shortest sequence that still fails), and how often each operator ended
+how. `--again FILE` repeats the shortest sequences of an earlier campaign.json.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections import Counter
+from itertools import count
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import bpy
+from survival_actions import ACTIONS, FILE_ACTIONS, to_object_mode
+from survival_parameters import NOT_ALONE, parameters, prepare
+from survival_scene import PACKAGE, STARTS, build_start, load_extension
+from survival_state import (
+    content,
+    difference,
+    faults,
+    linked,
+    mark_sources,
+    material_digest,
+    shared_tags,
+    unused,
+    without_linked,
+)
+
+OURS_SHARE = 0.45
+UNDO_CHECK_SHARE = 0.3
+FILE_STEPS = ("undo", "redo", "save", "reload", *FILE_ACTIONS)
+FILE_SHARE = 0.2
+UNDO_STEPS = 256
+TRIES = 4
+"""Selections and modes tried until an operator accepts one; the last one is taken in any case."""
+RARE = {"light_scene": 0.1}
+"""Operators that render: drawn that much less often."""
+
+
+class Failure(Exception):
+    """A step after which something does not hold."""
+
+
+class Sequence:
+    """One file and its undo history, step by step."""
+
+    def __init__(self, folder, module, log):
+        self.folder, self.module, self.log = folder, module, log
+        self.saved = folder / "saved.blend"
+        self.library = folder / "library.blend"
+        self.results = Counter()
+
+    def begin(self, start):
+        """Open a start scene."""
+        self.marks = count()
+        self.library.unlink(missing_ok=True)
+        self._open(self.folder / f"{start}.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.saved))
+        self.log.mark()
+
+    def _open(self, path):
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        bpy.context.preferences.edit.undo_steps = UNDO_STEPS
+        bpy.ops.ed.undo_push(message="opened")
+        self.history, self.place = [content()], 0
+
+    def step(self, name, seed):
+        """Do one step and look at everything. Raises Failure."""
+        random = Random(seed)
+        if name.startswith("vlm."):
+            self._ours(name.removeprefix("vlm."), random)
+        elif name in FILE_STEPS:
+            self._file_step(name, random)
+        else:
+            self._blenders(name, ACTIONS[name], random)
+        self.log.require_no_traceback()
+        found = faults(self.module)
+        if found:
+            raise Failure("; ".join(found[:4]))
+
+    def _blenders(self, name, action, random, *rest):
+        try:
+            action(random, *rest)
+        except RuntimeError as error:
+            if "Traceback" in str(error):
+                raise Failure(str(error)) from error
+        bpy.ops.ed.undo_push(message=name)
+        self._remember()
+
+    def _file_step(self, name, random):
+        if name in ("undo", "redo"):
+            self._travel(-1 if name == "undo" else 1, random.randint(1, 3))
+        elif name == "save":
+            bpy.ops.wm.save_as_mainfile(filepath=str(self.saved))
+            bpy.ops.wm.save_as_mainfile(filepath=str(self.library), copy=True)
+        elif name == "reload":
+            self._open(self.saved)
+        else:
+            self._blenders(name, FILE_ACTIONS[name], random, self.library)
+
+    def _remember(self):
+        del self.history[self.place + 1 :]
+        self.history.append(content())
+        self.place += 1
+
+    def _travel(self, direction, count):
+        for _ in range(count):
+            place = self.place + direction
+            if not 0 <= place < len(self.history):
+                return
+            (bpy.ops.ed.undo if direction < 0 else bpy.ops.ed.redo)()
+            self.place = place
+            # What was linked stays loaded when the step that linked it is undone.
+            changed = difference(without_linked(self.history[place]), without_linked(content()))
+            self._require_none(changed, "undo" if direction < 0 else "redo")
+
+    def _require_none(self, changed, after):
+        if changed:
+            raise Failure(f"after {after} these differ: {', '.join(changed[:4])}")
+
+    def _ours(self, name, random):
+        self._prepare(name, random)
+        bpy.ops.ed.undo_push(message="prepared")
+        self._remember()
+        before = self.history[self.place]
+        orphans, materials, shared = unused(), _materials(), shared_tags()
+        values = parameters(name, random)
+        self.log.note(f"{name}({values})")
+        result = self._call(name, values)
+        self.results[f"{name} {result}"] += 1
+        self.log.note(result)
+        if result != "FINISHED":
+            self._require_none(difference(before, content()), f"{name} that was refused")
+            return
+        self._remember()
+        self._require_none(difference(linked(before), linked(self.history[self.place])), f"{name}, in linked data,")
+        self._require_sound(name, orphans, materials, shared)
+        if self.history[self.place] != before and random.random() < UNDO_CHECK_SHARE:
+            self._travel(-1, 1)
+            self._travel(1, 1)
+        if mark_sources(self.marks):
+            bpy.ops.ed.undo_push(message="stamped")
+            self._remember()
+
+    def _prepare(self, name, random):
+        for _ in range(TRIES):
+            try:
+                prepare(random)
+            except RuntimeError:
+                self.results[f"{name} not prepared"] += 1
+            if getattr(bpy.ops.vlm, name).poll():
+                return
+
+    def _call(self, name, values):
+        try:
+            result = getattr(bpy.ops.vlm, name)("EXEC_DEFAULT", True, **values)
+        except RuntimeError as error:
+            sentence = str(error)
+            if "Traceback" in sentence or "context is incorrect" in sentence:
+                raise Failure(f"vlm.{name}({values}): {sentence.strip()}") from error
+            return "refused"
+        except TypeError as error:
+            raise Failure(f"vlm.{name}({values}): {error}") from error
+        return next(iter(result))
+
+    def _require_sound(self, name, orphans, materials, shared):
+        new = unused() - orphans
+        if new:
+            raise Failure(f"vlm.{name} leaves data that nothing uses: {', '.join(sorted(new)[:4])}")
+        if _materials() != materials:
+            raise Failure(f"vlm.{name} changed a visible material")
+        grown = {tag: names for tag, names in shared_tags().items() if tag not in shared}
+        if grown:
+            raise Failure(f"vlm.{name} made unrelated light meshes share tags: {grown}")
+
+
+def _materials():
+    return {material.name_full: material_digest(material) for material in bpy.data.materials}
+
+
+class Log:
+    """What this process prints, C and Python alike, in a file that is searched after each step."""
+
+    def __init__(self, path):
+        self.path = path
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND)
+        self.terminal = os.dup(1)
+        for stream in (1, 2):
+            os.dup2(self._file, stream)
+        self._place = 0
+
+    def mark(self):
+        """Look at what is printed from here on."""
+        sys.stdout.flush()
+        self._place = self.path.stat().st_size
+
+    def note(self, text):
+        """A line of the campaign's own."""
+        os.write(self._file, f"-- {text}\n".encode())
+
+    def tell(self, text):
+        """A line to the terminal."""
+        os.write(self.terminal, f"{text}\n".encode())
+
+    def require_no_traceback(self):
+        """Raises Failure where a handler printed a traceback since the last look."""
+        sys.stdout.flush()
+        with self.path.open("rb") as file:
+            file.seek(self._place)
+            text = file.read().decode(errors="replace")
+            self._place = file.tell()
+        if "Traceback" in text:
+            raise Failure(text[text.index("Traceback") :][-1500:])
+
+
+def plan(seed, steps):
+    """The start scene and the steps of one sequence, as (name, seed of its own)."""
+    random = Random(seed)
+    ours = [f"vlm.{name}" for name in sorted(dir(bpy.ops.vlm)) if name not in NOT_ALONE]
+    chosen = [("vlm.create_from_selection", random.getrandbits(32))]
+    while len(chosen) < steps:
+        kind = random.random()
+        if kind < OURS_SHARE:
+            name = random.choice(ours)
+            if random.random() > RARE.get(name.removeprefix("vlm."), 1.0):
+                continue
+        else:
+            name = random.choice(FILE_STEPS if kind < OURS_SHARE + FILE_SHARE else list(ACTIONS))
+        chosen.append((name, random.getrandbits(32)))
+    return random.choice(STARTS), chosen
+
+
+def first_fault(sequence, start, steps):
+    """(index, sentence) of the first step after which something does not hold, or None."""
+    sequence.begin(start)
+    for index, (name, seed) in enumerate(steps):
+        sequence.log.note(f"{index} {name} {seed}")
+        try:
+            sequence.step(name, seed)
+        except Failure as failure:
+            to_object_mode()
+            return index, str(failure)
+    return None
+
+
+def shortest(sequence, start, steps, sentence):
+    """Steps with all left out that the same kind of fault does not need."""
+    kind = kind_of(sentence)
+    index = len(steps) - 2
+    while index >= 0:
+        shorter = steps[:index] + steps[index + 1 :]
+        found = first_fault(sequence, start, shorter)
+        if found is not None and kind_of(found[1]) == kind:
+            steps = shorter[: found[0] + 1]
+            index = min(index, len(steps) - 1)
+        index -= 1
+    return steps
+
+
+def kind_of(sentence):
+    """What two failures have in common that are of one kind: the last line that tells anything, without names."""
+    lines = [line for line in sentence.strip().splitlines() if not line.startswith("Location:")]
+    return "".join(each for each in lines[-1].split("'")[0] if not each.isdigit())[:50]
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--sequences", type=int, default=10)
+    parser.add_argument("--steps", type=int, default=30)
+    parser.add_argument("--again", type=Path)
+    parser.add_argument("--no-shrink", action="store_true")
+    arguments = parser.parse_args()
+    log = Log(arguments.folder / "campaign.log")
+    load_extension()
+    for start in STARTS:
+        build_start(start, arguments.folder / f"{start}.blend")
+    module = sys.modules[f"{PACKAGE}.vlm_addon.blender.light_meshes"]
+    sequence = Sequence(arguments.folder, module, log)
+    told = {"version": bpy.app.version_string, "failures": (failures := [])}
+    for seed, start, steps in _sequences(arguments):
+        log.note(f"sequence {seed} in {start}")
+        found = first_fault(sequence, start, steps)
+        if found is not None:
+            results = sequence.results.copy()
+            last = steps[: found[0] + 1]
+            known = kind_of(found[1]) in {kind_of(each["sentence"]) for each in failures}
+            short = last if arguments.no_shrink or known else shortest(sequence, start, last, found[1])
+            sequence.results = results
+            failures.append({"seed": seed, "start": start, "sentence": found[1], "steps": short})
+            log.tell(f"sequence {seed} in {start}: {found[1][-400:]}\n    {[name for name, _ in short][-40:]}")
+        told["results"] = dict(sorted(sequence.results.items()))
+        (arguments.folder / "campaign.json").write_text(json.dumps(told, indent=1))
+    log.tell(f"{len(failures)} sequences failed")
+
+
+def _sequences(arguments):
+    if arguments.again:
+        earlier = json.loads(arguments.again.read_text())["failures"]
+        return [(each["seed"], each["start"], [tuple(step) for step in each["steps"]]) for each in earlier]
+    seeds = range(arguments.first, arguments.first + arguments.sequences)
+    return [(seed, *plan(seed, arguments.steps)) for seed in seeds]
+
+
+if __name__ == "__main__":
+    main()
