@@ -159,9 +159,8 @@ def _light_tags(facts: SceneFacts, before: Before) -> Verdict:
         return Verdict(NEUTRAL, f"none of the {facts.light_mesh.lights:,} virtual lights has a tag")
     if not facts.tagged_surface:
         return Verdict(NEUTRAL, "no surface has a tag")
-    return Verdict(
-        CALLED_FOR, f"{facts.light_mesh.tagged:,} virtual lights have a tag and leave out surfaces of the same"
-    )
+    which = "of the same" if not facts.light_mesh.links else f"of the same and of {facts.light_mesh.links:,} links"
+    return Verdict(CALLED_FOR, f"{facts.light_mesh.tagged:,} virtual lights have a tag and leave out surfaces {which}")
 
 
 def _light_visibility(facts: SceneFacts, before: Before) -> Verdict:

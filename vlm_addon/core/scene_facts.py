@@ -54,12 +54,14 @@ class ScreenFacts:
 
 @dataclass(frozen=True)
 class LightMeshFacts:
-    """Of a virtual light mesh. reflecting: lights that reflect; glowing: lights that shine by themselves."""
+    """Of a virtual light mesh. reflecting: lights that reflect; glowing: lights that shine by themselves. links: pairs of a
+    light's tag and one that such lights leave out beside their own."""
 
     lights: int
     reflecting: int
     glowing: int
     tagged: int
+    links: int = 0
 
 
 @dataclass(frozen=True)
@@ -190,4 +192,5 @@ def _light_mesh_facts(light_mesh: VirtualLightMesh) -> LightMeshFacts:
         int((sends & (light_mesh.colour > 0.0).any(axis=1)).sum()),
         int((sends & (light_mesh.emission > 0.0).any(axis=1)).sum()),
         int((light_mesh.tag_ids != UNTAGGED).sum()),
+        len(light_mesh.links),
     )

@@ -31,10 +31,11 @@ _LARGEST_BITS = 24
 # Odd, so that each tag id counts with all of its bits; otherwise any will do.
 _HASH = {"LINK_HASH_LIGHT": 0x5BD1E995, "LINK_HASH_SURFACE": 0x2C1B3C6D, "LINK_HASH_MIX": 0x297A2D39}
 _HASH_SHIFT = 15
-LINK_DEFINES: dict[str, int | float | bool | str] = {
+TAG_DEFINES: dict[str, int | float | bool | str] = {
     **_HASH,
     "LINK_HASH_SHIFT": _HASH_SHIFT,
     "LIGHT_LINK_UNIT": LINK_UNIT,
+    "UNTAGGED": UNTAGGED,
 }
 """What passes/light_tags.glsl needs."""
 

@@ -14,7 +14,7 @@ from ..shader_library import ShaderLibrary, set_uniforms
 from ..view import View
 from ..virtual_lights import GpuVirtualLights
 from .gbuffer import GBuffer
-from .phase_two import TAG_DEFINES, IrradianceImage, bind_lights, entry_runs
+from .phase_two import IrradianceImage, bind_lights, entry_runs
 from .tile_bounds import TILE_DEFINES, TileBoundsPass
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class LightMeshReflectionPass:
         self._image = IrradianceImage(context, width, height)
         self._tile_bounds = TileBoundsPass(context, shaders, width, height)
         self._albedo, self._table = AlbedoTexture(context), LtcTexture(context)
-        defines = {**TILE_DEFINES, **LTC_DEFINES, **TAG_DEFINES, "LTC_TABLE_UNIT": LTC_TABLE_UNIT}
+        defines = {**TILE_DEFINES, **LTC_DEFINES, "LTC_TABLE_UNIT": LTC_TABLE_UNIT}
         self._shader = shaders.compute("passes/light_mesh_reflection.comp", defines)
 
     def render(

@@ -8,9 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ...core.progress import Progress, step
-from ...core.scene import UNTAGGED
 from ..gpu_layout import CONSTANTS
-from ..link_table import LINK_DEFINES
 from ..shader_library import Defines, ShaderLibrary, set_uniforms
 from ..virtual_lights import GpuVirtualLights
 from .baked_pixels import PixelVisibility
@@ -28,8 +26,7 @@ MIN_LIGHTS_PER_DISPATCH = 64
 # Mesa's software renderers end all loops of an invocation after 65,535 iterations together, without a word; a light
 # takes one, and one more for each pixel of the invocation.
 MAX_LIGHTS_PER_DISPATCH = 8192
-TAG_DEFINES = {**LINK_DEFINES, "UNTAGGED": UNTAGGED}
-PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, **TAG_DEFINES, "PICKS": False, "BAKED": False}
+PHASE_TWO_DEFINES = {**TILE_DEFINES, **PICK_DEFINES, "PICKS": False, "BAKED": False}
 
 
 class IrradianceImage:

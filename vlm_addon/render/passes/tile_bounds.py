@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..gpu_layout import POINT_GROUP
+from ..link_table import TAG_DEFINES
 from ..shader_library import ShaderLibrary, set_uniforms
 from .gbuffer import GBuffer
 
@@ -22,7 +23,12 @@ GROUP_SIDE = 8
 PIXELS_PER_SIDE = 2
 TILE_SIDE = GROUP_SIDE * PIXELS_PER_SIDE
 TILE_BINDING = 0
-TILE_DEFINES = {"GROUP_SIDE": GROUP_SIDE, "PIXELS_PER_SIDE": PIXELS_PER_SIDE, "TILE_BINDING": TILE_BINDING}
+TILE_DEFINES = {
+    **TAG_DEFINES,
+    "GROUP_SIDE": GROUP_SIDE,
+    "PIXELS_PER_SIDE": PIXELS_PER_SIDE,
+    "TILE_BINDING": TILE_BINDING,
+}
 """What passes/tile_pixels.glsl needs."""
 
 
