@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from tests.core.surface_shapes import cube, grid, icosphere, mesh_of
 from vlm_addon.core.errors import InvalidInput
+from vlm_addon.core.light_links import leaves_out
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.core.tags import (
-    is_tagged,
     light_of_triangles,
     next_tag,
     pair_nearest,
@@ -25,8 +25,7 @@ MAPS = st.lists(st.tuples(st.integers(-1, 6), st.integers(0, 5)), min_size=1, ma
 
 
 def left_out(found: object, light: int, face: int) -> bool:
-    arrays = (np.array([found.light_tags[light]]), np.array([found.face_tags[face]]))
-    return bool(is_tagged(*arrays, found.links)[0])
+    return bool(leaves_out(found.links, found.light_tags[light], found.face_tags[face]))
 
 
 @given(rows=MAPS, first=st.integers(1, 1000))

@@ -7,22 +7,23 @@ light, plus the light's area times 1 - cosine between their normals, so that the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from .light_mesh import VirtualLightMesh
-from .mesh_topology import Int64
+from .mesh_topology import Int64, Rows
 from .morton import morton_codes
 from .scene import Float64, Int32, Mesh
-from .triangle_distance import flat_triangles
+from .triangle_distance import FlatTriangles, flat_triangles
 
-# Triangles that look for candidates together.
-BLOCK = 64
-# Candidate pairs held at once.
+# Triangles that look for candidates together, level by level.
+BLOCKS = (2048, 256, 32, 4)
+# Pairs of a block or triangle and a light that are held at once.
 PAIRS_PER_BATCH = 1 << 20
-# Blocks times lights whose bounds are held at once.
-BOUNDS_PER_BATCH = 1 << 22
+# What rounding may take from a bound.
+SLACK = 1e-9
 
 
 def pair_nearest(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> tuple[Int32, ...]:
@@ -44,62 +45,110 @@ def light_of_triangles(light_corners: Float64, source_corners: Float64) -> Int32
     axis = np.abs(normal).argmax(axis=1)
     side = 2 * axis + (normal[np.arange(len(normal)), axis] < 0)
     order = np.lexsort([morton_codes(middle), side])
-    starts = np.arange(0, len(order), BLOCK)
-    blocks_at_once = max(1, BOUNDS_PER_BATCH // len(light_corners))
-    for first in range(0, len(starts), blocks_at_once):
-        block = starts[first : first + blocks_at_once]
-        rows = order[block[0] : block[-1] + BLOCK]
-        nearest[rows] = _of_blocks(light_corners, middle[rows], normal[rows])
+    lights = _Lights.of(light_corners)
+    blocks_at_once = max(1, PAIRS_PER_BATCH // len(light_corners)) * BLOCKS[0]
+    for first in range(0, len(order), blocks_at_once):
+        rows = order[first : first + blocks_at_once]
+        nearest[rows] = _nearest(lights, middle[rows], normal[rows])
     return nearest
 
 
-def _of_blocks(light_corners: Float64, middle: Float64, normal: Float64) -> Int32:
-    """The nearest light of each triangle; BLOCK of them after each other lie together."""
-    starts = np.arange(0, len(middle), BLOCK)
-    low, high = np.minimum.reduceat(middle, starts), np.maximum.reduceat(middle, starts)
-    block, light = _candidates(light_corners, low, high)
-    flat = flat_triangles(light_corners)
-    light_normal, area = _unit_normals(light_corners)
+@dataclass(frozen=True)
+class _Lights:
+    flat: FlatTriangles
+    low: Float64
+    high: Float64
+    middle: Float64
+    normal: Float64
+    area: Float64
+
+    @staticmethod
+    def of(corners: Float64) -> _Lights:
+        normal, area = _unit_normals(corners)
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        return _Lights(flat_triangles(corners), low, high, corners.mean(axis=1), normal, area)
+
+
+def _nearest(lights: _Lights, middle: Float64, normal: Float64) -> Int32:
+    """The nearest light of each triangle; those that follow each other in blocks lie together and face alike."""
+    pairs = Rows(np.arange(len(lights.area)), np.array([0, len(lights.area)]))
+    parent_size = len(middle)
+    for size in BLOCKS:
+        starts = np.arange(0, len(middle), size)
+        box = _Boxes.of(middle, normal, starts)
+        pairs = _narrowed(lights, box, pairs, starts // parent_size)
+        parent_size = size
     nearest = np.empty(len(middle), np.int32)
-    first_of = np.searchsorted(block, np.arange(len(starts) + 1))
-    cost = np.cumsum(np.diff(first_of) * BLOCK)
-    batch = np.searchsorted(cost, np.arange(1, cost[-1] // PAIRS_PER_BATCH + 2) * PAIRS_PER_BATCH) + 1
-    begin = 0
-    for end in np.unique(np.minimum(batch, len(starts))):
-        rows = np.arange(starts[begin], min(starts[end - 1] + BLOCK, len(middle)))
-        of_block = rows // BLOCK
-        count = first_of[of_block + 1] - first_of[of_block]
-        owner = np.repeat(np.arange(len(rows)), count)
-        run = np.cumsum(count) - count
-        which = light[first_of[of_block][owner] + np.arange(len(owner)) - run[owner]]
-        score = flat.squared_distances(middle[rows][owner], which)
-        cosine = np.einsum("ij,ij->i", normal[rows][owner], light_normal[which])
-        score += (1.0 - cosine) * area[which]
-        best = np.flatnonzero(score == np.minimum.reduceat(score, run)[owner])
-        nearest[rows] = which[best[np.searchsorted(owner[best], np.arange(len(rows)))]]
-        begin = int(end)
+    parent = np.arange(len(middle)) // parent_size
+    for rows in _batches(pairs.lengths[parent]):
+        nearest[rows] = _exact(lights, middle[rows], normal[rows], pairs, parent[rows])
     return nearest
 
 
-def _candidates(light_corners: Float64, low: Float64, high: Float64) -> tuple[Int64, Int64]:
-    """(block, light) of all lights that may be the nearest of some point of each block's box, by block.
+@dataclass(frozen=True)
+class _Boxes:
+    """Blocks of points: corners of their boxes, and a cone around their normals of half angle `spread`."""
 
-    No light whose box is farther away than the farthest way from the block to some light's middle can be the nearest.
-    """
-    light_low, light_high = light_corners.min(axis=1), light_corners.max(axis=1)
-    light_middle = light_corners.mean(axis=1)
-    area = _unit_normals(light_corners)[1]
-    nearest, farthest = np.zeros((len(low), len(light_corners))), np.zeros((len(low), len(light_corners)))
-    for axis in range(3):
-        gap = np.maximum(light_low[None, :, axis] - high[:, None, axis], low[:, None, axis] - light_high[None, :, axis])
-        nearest += np.maximum(gap, 0.0) ** 2
-        way = np.maximum(
-            high[:, None, axis] - light_middle[None, :, axis], light_middle[None, :, axis] - low[:, None, axis]
-        )
-        farthest += way**2
-    most = (farthest + 2.0 * area).min(axis=1)
-    block, light = np.nonzero(nearest <= most[:, None] * (1.0 + 1e-9))
-    return block, light
+    low: Float64
+    high: Float64
+    axis: Float64
+    spread: Float64
+
+    @staticmethod
+    def of(middle: Float64, normal: Float64, starts: Int64) -> _Boxes:
+        axis = np.add.reduceat(normal, starts)
+        length = np.linalg.norm(axis, axis=1, keepdims=True)
+        axis = np.divide(axis, length, out=np.zeros_like(axis), where=length > 0)
+        lengths = np.diff(np.append(starts, len(middle)))
+        cosine = np.einsum("ij,ij->i", normal, np.repeat(axis, lengths, axis=0))
+        spread = np.arccos(np.clip(np.minimum.reduceat(cosine, starts), -1.0, 1.0))
+        return _Boxes(np.minimum.reduceat(middle, starts), np.maximum.reduceat(middle, starts), axis, spread)
+
+
+def _narrowed(lights: _Lights, box: _Boxes, pairs: Rows, parent: Int64) -> Rows:
+    """Of the lights of each block's parent, those that may be the nearest of some point of the block."""
+    kept_light, count = [], np.zeros(len(parent), np.int64)
+    for rows in _batches(pairs.lengths[parent]):
+        owner, light = pairs.expand(parent[rows])
+        row = rows[owner]
+        gap = np.maximum(lights.low[light] - box.high[row], box.low[row] - lights.high[light])
+        least = (np.maximum(gap, 0.0) ** 2).sum(axis=1)
+        way = np.maximum(box.high[row] - lights.middle[light], lights.middle[light] - box.low[row])
+        most = (way**2).sum(axis=1)
+        turned = np.arccos(np.clip(np.einsum("ij,ij->i", lights.normal[light], box.axis[row]), -1.0, 1.0))
+        spread, area = box.spread[row], lights.area[light]
+        least += (1.0 - np.cos(np.maximum(turned - spread, 0.0))) * area
+        most += (1.0 - np.cos(np.minimum(turned + spread, np.pi))) * area
+        keep = least <= _least_of_each(most, owner)[owner] * (1.0 + SLACK)
+        kept_light.append(light[keep])
+        count[rows] = np.bincount(owner[keep], minlength=len(rows))
+    return Rows(np.concatenate(kept_light), np.concatenate([[0], np.cumsum(count)]))
+
+
+def _exact(lights: _Lights, middle: Float64, normal: Float64, pairs: Rows, parent: Int64) -> Int64:
+    owner, light = pairs.expand(parent)
+    turned = (1.0 - np.einsum("ij,ij->i", normal[owner], lights.normal[light])) * lights.area[light]
+    gap = np.maximum(lights.low[light] - middle[owner], middle[owner] - lights.high[light])
+    least = (np.maximum(gap, 0.0) ** 2).sum(axis=1) + turned
+    most = ((middle[owner] - lights.middle[light]) ** 2).sum(axis=1) + turned
+    keep = least <= _least_of_each(most, owner)[owner] * (1.0 + SLACK)
+    owner, light, turned = owner[keep], light[keep], turned[keep]
+    score = lights.flat.squared_distances(middle[owner], light) + turned
+    best = np.flatnonzero(score == _least_of_each(score, owner)[owner])
+    return light[best[np.searchsorted(owner[best], np.arange(len(middle)))]]
+
+
+def _least_of_each(values: Float64, owner: Int64) -> Float64:
+    """The least value of each owner; owners ascend from 0, none is left out."""
+    least: Float64 = np.minimum.reduceat(values, np.flatnonzero(np.diff(owner, prepend=-1)))
+    return least
+
+
+def _batches(lengths: Int64) -> Iterator[Int64]:
+    """Runs of rows with about PAIRS_PER_BATCH entries together."""
+    batch = np.cumsum(lengths) // PAIRS_PER_BATCH
+    at = np.flatnonzero(np.diff(batch)) + 1
+    yield from np.split(np.arange(len(lengths)), at)
 
 
 def _unit_normals(corners: Float64) -> tuple[Float64, Float64]:

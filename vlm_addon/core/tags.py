@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tag ids for lights and faces: of the regions that lights stand for, and apart where unrelated things share one.
 
-A surface point leaves out every light of its own tag, and every light linked to it (seed 002, section 3.4). What must be
-left out are the lights whose region holds the point (own light), and nothing else: an object lights its other parts.
+A surface point leaves out every light of its own tag, and every light linked to it (seed 002, section 3.4). What must
+be left out are the lights whose region holds the point (own light), and nothing else: an object lights its other parts.
 A face carries one tag, though its triangles may lie in regions of several lights. Faces of one light carry the tag of
 that light; faces of several carry a tag of their own for that set of lights, and each of these lights is linked to it.
 """
@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import InvalidInput
-from .mesh_topology import Bool, Int64, rows_by_key
+from .light_links import make_links, no_links
+from .mesh_topology import Int64, rows_by_key
 from .nearest_lights import light_of_triangles, pair_nearest
 from .scene import UNTAGGED, Int32
 from .thin_surface import ThinSurface, thin_triangles
 
 __all__ = [
-    "NO_LINKS",
     "RegionTags",
     "SeparatedTags",
     "ThinSurface",
@@ -33,8 +33,6 @@ __all__ = [
     "shared_wrongly",
     "thin_triangles",
 ]
-
-NO_LINKS = np.zeros((0, 2), np.int32)
 
 
 @dataclass(frozen=True)
@@ -79,12 +77,12 @@ def region_tags(
     alone = count[face] == 1
     face_tags[face[alone]] = first_tag + member[alone]
     if alone.all():
-        return RegionTags(light_tags, face_tags, NO_LINKS)
+        return RegionTags(light_tags, face_tags, no_links())
     face, member = face[~alone], member[~alone]
     shared, number = _sets(face, member, groups)
     face_tags[shared] = first_tag + groups + number
     links = np.stack([first_tag + member, face_tags[face]], axis=1)
-    return RegionTags(light_tags, face_tags, np.unique(links, axis=0).astype(np.int32))
+    return RegionTags(light_tags, face_tags, make_links(links))
 
 
 def _checked(light_of_triangle: npt.ArrayLike, face_of_triangle: npt.ArrayLike) -> tuple[Int64, Int64]:
@@ -158,8 +156,8 @@ def separated_tags(
     """The tags with a new id, from `first_tag` on, for all but one of the groups that share one.
 
     The group with lights and faces of the id keeps it, of several such the smallest number. Within a group lights and
-    faces go on sharing; faces whose group has no light of the id, and lights whose group has no such face, lose the tag:
-    it would leave out nothing of their own. Arguments as for `shared_wrongly`.
+    faces go on sharing; faces whose group has no light of the id, and lights whose group has no such face, lose the
+    tag: it would leave out nothing of their own. Arguments as for `shared_wrongly`.
     """
     light_tags, face_tags = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
     light_group, face_group = np.asarray(light_group, np.int64), np.asarray(face_group, np.int64)
@@ -187,16 +185,3 @@ def _by_tag(tags: Int32, wanted: Int32) -> list[Int64]:
     rows = np.flatnonzero(wanted[place] == tags) if len(wanted) else np.zeros(0, np.int64)
     gathered = rows_by_key(place[rows], len(wanted), rows)
     return [gathered.values[start:end] for start, end in zip(gathered.starts[:-1], gathered.starts[1:], strict=True)]
-
-
-def is_tagged(light_tags: Int32, triangle_tags: Int32, links: Int32) -> Bool:
-    """(p,) whether each light is left out by the triangle beside it: of one tag, or linked."""
-    same = (light_tags == triangle_tags) & (light_tags != UNTAGGED)
-    if not len(links):
-        return same
-    span = np.int64(max(int(links.max()), int(triangle_tags.max(initial=0)), int(light_tags.max(initial=0))) + 1)
-    keys = np.unique(links[:, 0] * span + links[:, 1])
-    wanted = light_tags * span + triangle_tags
-    place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    linked: Bool = keys[place] == wanted
-    return same | linked

@@ -23,6 +23,8 @@ from .triangle_tree import TriangleTree, build_tree
 
 # Rays from the back of each light's region that look for what sees it from behind.
 BACK_RAYS = 16
+# So many of them first; only where one meets a front, the others.
+FIRST_RAYS = 4
 # Share of these that must meet the front of something.
 SEEN_SHARE = 0.25
 # A ray starts this share of the scene's half diagonal behind its surface.
@@ -112,29 +114,42 @@ def two_sided(lights: Int32, corners: Float64, is_open: Bool, tree: TriangleTree
     if not len(rows):
         return seen
     _, region = np.unique(lights[rows], return_inverse=True)
-    points, directions, owner = _back_rays(corners[rows], region)
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    diagonal = float(np.linalg.norm(high - low))
-    start = points + START_SHARE * diagonal * directions
-    end = points + diagonal * directions
-    front, back = tree.first_hits(start, end), tree.first_hits(start, end, True)
-    faced = np.bincount(owner, weights=front < back, minlength=int(region.max()) + 1)
+    count = int(region.max()) + 1
+    points, directions = _back_rays(corners[rows], region, count)
+    faced = np.zeros(count, np.int64)
+    looked_at = np.arange(count)
+    for rays in (np.arange(FIRST_RAYS), np.arange(FIRST_RAYS, BACK_RAYS)):
+        which = (looked_at[:, None] * BACK_RAYS + rays).ravel()
+        meets = _meets_fronts(points[which], directions[which], corners, tree)
+        faced[looked_at] += meets.reshape(len(looked_at), len(rays)).sum(axis=1)
+        # What is faced at all often enough shows in the first rays.
+        looked_at = np.flatnonzero(faced > 0)
     seen[rows] = (faced >= SEEN_SHARE * BACK_RAYS)[region]
     return seen
 
 
-def _back_rays(corners: Float64, region: Int64) -> tuple[Float64, Float64, Int64]:
-    """(points, unit directions, region): BACK_RAYS from the back of each region, even over area and cosine."""
+def _meets_fronts(points: Float64, directions: Float64, corners: Float64, tree: TriangleTree) -> Bool:
+    """(r,) whether the first triangle that each ray from just off `points` meets shows its front."""
+    diagonal = float(np.linalg.norm(corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))))
+    met = tree.first_met(points + START_SHARE * diagonal * directions, points + diagonal * directions)
+    facing = np.einsum("ij,ij->i", _unit_normals(corners[met]), directions) < 0
+    found: Bool = (met >= 0) & facing
+    return found
+
+
+def _back_rays(corners: Float64, region: Int64, count: int) -> tuple[Float64, Float64]:
+    """(points, unit directions): BACK_RAYS from the back of each of `count` regions, even over area and cosine."""
     random = np.random.default_rng(0)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(normal, axis=1)
     order = np.argsort(region, kind="stable")
     sums = np.cumsum(area[order])
-    count = int(region.max()) + 1
     ends = np.searchsorted(region[order], np.arange(count), side="right")
     begin = np.concatenate([[0.0], sums[ends[:-1] - 1]])
     owner = np.repeat(np.arange(count), BACK_RAYS)
-    along = (np.tile(np.arange(BACK_RAYS), count) + random.random(len(owner))) / BACK_RAYS
+    # The first rays are spread over the whole region, too.
+    place = np.arange(BACK_RAYS).reshape(FIRST_RAYS, -1).T.ravel()
+    along = (np.tile(place, count) + random.random(len(owner))) / BACK_RAYS
     at = begin[owner] + along * (sums[ends - 1] - begin)[owner]
     slot = np.clip(np.searchsorted(sums, at), np.concatenate([[0], ends[:-1]])[owner], ends[owner] - 1)
     triangle = order[slot]
@@ -144,7 +159,7 @@ def _back_rays(corners: Float64, region: Int64) -> tuple[Float64, Float64, Int64
     ball = random.normal(size=(len(owner), 3))
     # Normal plus a uniform direction is spread by the cosine.
     directions = -unit + 0.999 * ball / np.linalg.norm(ball, axis=1, keepdims=True)
-    return points, directions / np.linalg.norm(directions, axis=1, keepdims=True), owner
+    return points, directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def _unit_normals(corners: Float64) -> Float64:

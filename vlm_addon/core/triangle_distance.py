@@ -13,7 +13,7 @@ from .scene import Float64
 
 @dataclass(frozen=True)
 class FlatTriangles:
-    """Triangles, each in a frame of its own in which it is flat: cheaper than clamping barycentric coordinates in space.
+    """Triangles, each in a frame of its own in which it is flat.
 
     origins: (n, 3) first corners, m. frames: (n, 3, 3) rows x, y, normal. flat: (n, 3, 2) corners in x and y.
     """
@@ -48,7 +48,8 @@ def flat_triangles(corners: Float64) -> FlatTriangles:
     degenerate = ~(np.einsum("ij,ij->i", normal, normal) > 0)
     longest = np.where((np.linalg.norm(side, axis=1) > 0)[:, None], side, other)
     # Any frame that holds the segment will do.
-    normal[degenerate] = np.cross(longest[degenerate], np.roll(longest[degenerate], 1, axis=1) + [1.0, 2.0, 3.0])
+    slanted = np.roll(longest[degenerate], 1, axis=1) + np.array([1.0, 2.0, 3.0])
+    normal[degenerate] = np.cross(longest[degenerate], slanted)
     x_axis = _unit(longest)
     normal = _unit(normal)
     frames = np.stack([x_axis, np.cross(normal, x_axis), normal], axis=1)

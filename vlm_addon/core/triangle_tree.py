@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh_topology import Int64
+from .mesh_topology import Bool, Int64
 from .morton import morton_codes
 from .scene import Float64
 
@@ -16,6 +16,9 @@ LEAF_SIZE = 4
 HIT_START = 1e-6
 # A segment through an edge meets at least one of its triangles, also with rounding.
 EDGE_SLACK = 1e-9
+# Entering and leaving a box that is flat agree up to rounding.
+SLAB_SLACK = 1e-9
+SEGMENTS_PER_BATCH = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,11 @@ class TriangleTree:
         origins, ends: (r, 3). from_behind: count only triangles whose front faces away from the origin. Starting
         points that lie on a triangle do not count as hits.
         """
-        return _first_hits(self, origins, ends, from_behind)
+        return _first_hits(self, origins, ends, from_behind)[0]
+
+    def first_met(self, origins: Float64, ends: Float64, from_behind: bool = False) -> Int64:
+        """(r,) int64: the triangle that `first_hits` finds, -1 for none."""
+        return _first_hits(self, origins, ends, from_behind)[1]
 
 
 def build_tree(corners: Float64) -> TriangleTree:
@@ -70,26 +77,51 @@ def _size_classes(corners: Float64) -> Int64:
     return classes
 
 
-def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> Float64:
+def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> tuple[Float64, Int64]:
+    nearest, met = np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
+    for first in range(0, len(origins), SEGMENTS_PER_BATCH):
+        rows = slice(first, first + SEGMENTS_PER_BATCH)
+        segment, triangle = _met_boxes(tree, origins[rows], ends[rows])
+        corners = tree.corners[triangle]
+        fraction = _intersections(corners, origins[rows][segment], ends[rows][segment], from_behind)
+        hit = np.flatnonzero(np.isfinite(fraction))
+        hit = hit[np.lexsort([fraction[hit], segment[hit]])]
+        hit = hit[np.diff(segment[hit], prepend=-1) > 0]
+        nearest[rows][segment[hit]] = fraction[hit]
+        met[rows][segment[hit]] = triangle[hit]
+    return nearest, met
+
+
+def _met_boxes(tree: TriangleTree, origins: Float64, ends: Float64) -> tuple[Int64, Int64]:
+    """(segment, triangle) of all pairs of which the segment meets the triangle's box."""
     low, high = np.minimum(origins, ends), np.maximum(origins, ends)
-    segment = np.arange(len(origins))
-    node = np.zeros(len(origins), np.int64)
+    way = ends - origins
+    # Along an axis on which a segment does not move, the box test alone decides: any finite inverse will do.
+    inverse = 1.0 / np.where(np.abs(way) > np.finfo(float).tiny, way, 1.0)
+    moves = np.abs(way) > np.finfo(float).tiny
+
+    def meets(segment: Int64, box_low: Float64, box_high: Float64) -> Bool:
+        overlap = (low[segment] <= box_high).all(axis=1) & (high[segment] >= box_low).all(axis=1)
+        near = np.flatnonzero(overlap)
+        row = segment[near]
+        first, last = (box_low[near] - origins[row]) * inverse[row], (box_high[near] - origins[row]) * inverse[row]
+        enters = np.where(moves[row], np.minimum(first, last), -np.inf).max(axis=1)
+        leaves = np.where(moves[row], np.maximum(first, last), np.inf).min(axis=1)
+        overlap[near] = enters <= leaves + SLAB_SLACK * (1.0 + np.abs(leaves))
+        return overlap
+
+    segment, node = np.arange(len(origins)), np.zeros(len(origins), np.int64)
     for level, (node_low, node_high) in enumerate(zip(tree.lower, tree.upper, strict=True)):
         if level:
             segment, node = np.repeat(segment, 2), np.repeat(2 * node, 2)
             node[1::2] += 1
-        overlap = (low[segment] <= node_high[node]).all(axis=1) & (high[segment] >= node_low[node]).all(axis=1)
+        overlap = meets(segment, node_low[node], node_high[node])
         segment, node = segment[overlap], node[overlap]
     triangle = tree.order.reshape(-1, LEAF_SIZE)[node]
     segment = np.repeat(segment, LEAF_SIZE)[triangle.ravel() >= 0]
     triangle = triangle[triangle >= 0]
-    overlap = (low[segment] <= tree.triangle_upper[triangle]).all(axis=1)
-    overlap &= (high[segment] >= tree.triangle_lower[triangle]).all(axis=1)
-    segment, triangle = segment[overlap], triangle[overlap]
-    fraction = _intersections(tree.corners[triangle], origins[segment], ends[segment], from_behind)
-    nearest = np.full(len(origins), np.inf)
-    np.minimum.at(nearest, segment, fraction)
-    return nearest
+    overlap = meets(segment, tree.triangle_lower[triangle], tree.triangle_upper[triangle])
+    return segment[overlap], triangle[overlap]
 
 
 def _intersections(corners: Float64, origin: Float64, end: Float64, from_behind: bool) -> Float64:
