@@ -117,12 +117,23 @@ class MeshExtractor:
     def _look(self, local: LocalMesh, uses: tuple[MaterialUse, ...], name: str) -> _Look:
         key = (id(local), uses)
         if key not in self._looks:
-            slots = np.clip(local.material_slots, 0, len(uses) - 1)
-            indices = np.array([use.index for use in uses], np.int32)[slots]
-            uvs, colors = self._corner_uvs(local, uses, slots), self._corner_colors(local, uses, slots, name)
-            averages = triangle_averages(self._materials.materials, self._averager, indices, uvs, colors)
-            self._looks[key] = _Look(indices, uvs, colors, *averages)
+            self._looks[key] = self._new_look(local, uses, name)
         return self._looks[key]
+
+    def _new_look(self, local: LocalMesh, uses: tuple[MaterialUse, ...], name: str) -> _Look:
+        slots = np.clip(local.material_slots, 0, len(uses) - 1)
+        indices = np.array([use.index for use in uses], np.int32)[slots]
+        uvs, colors = self._corner_uvs(local, uses, slots), self._corner_colors(local, uses, slots, name)
+        averages = triangle_averages(self._materials.materials, self._averager, indices, uvs, colors)
+        return _Look(indices, uvs, colors, *averages)
+
+    def averages(self, blender_object: Any, local: LocalMesh) -> tuple[Float32, Float32]:
+        """Diffuse reflectance and radiant exitance (W/m²), (t, 3) each, of triangles with the materials of an object.
+
+        local: any triangles, as of parts of its mesh; their positions are not looked at.
+        """
+        look = self._new_look(local, self._uses(blender_object), blender_object.name)
+        return look.reflectance, look.emission
 
     def _uses(self, blender_object: Any) -> tuple[MaterialUse, ...]:
         if self._override is not None:
