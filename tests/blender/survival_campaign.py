@@ -8,7 +8,6 @@ how. `--again FILE` repeats the shortest sequences of an earlier campaign.json.
 
 import argparse
 import json
-import os
 import sys
 from collections import Counter
 from itertools import count
@@ -19,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
 from survival_actions import ACTIONS, FILE_ACTIONS, to_object_mode
+from survival_log import Failure, Log
 from survival_parameters import NOT_ALONE, parameters, prepare
 from survival_scene import PACKAGE, STARTS, build_start, load_extension
 from survival_state import (
@@ -29,8 +29,8 @@ from survival_state import (
     mark_sources,
     material_digest,
     shared_tags,
+    undoable,
     unused,
-    without_linked,
 )
 
 OURS_SHARE = 0.45
@@ -42,10 +42,6 @@ TRIES = 4
 """Selections and modes tried until an operator accepts one; the last one is taken in any case."""
 RARE = {"light_scene": 0.1}
 """Operators that render: drawn that much less often."""
-
-
-class Failure(Exception):
-    """A step after which something does not hold."""
 
 
 class Sequence:
@@ -117,8 +113,7 @@ class Sequence:
                 return
             (bpy.ops.ed.undo if direction < 0 else bpy.ops.ed.redo)()
             self.place = place
-            # What was linked stays loaded when the step that linked it is undone.
-            changed = difference(without_linked(self.history[place]), without_linked(content()))
+            changed = difference(undoable(self.history[place]), undoable(content()))
             self._require_none(changed, "undo" if direction < 0 else "redo")
 
     def _require_none(self, changed, after):
@@ -183,41 +178,6 @@ class Sequence:
 
 def _materials():
     return {material.name_full: material_digest(material) for material in bpy.data.materials}
-
-
-class Log:
-    """What this process prints, C and Python alike, in a file that is searched after each step."""
-
-    def __init__(self, path):
-        self.path = path
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND)
-        self.terminal = os.dup(1)
-        for stream in (1, 2):
-            os.dup2(self._file, stream)
-        self._place = 0
-
-    def mark(self):
-        """Look at what is printed from here on."""
-        sys.stdout.flush()
-        self._place = self.path.stat().st_size
-
-    def note(self, text):
-        """A line of the campaign's own."""
-        os.write(self._file, f"-- {text}\n".encode())
-
-    def tell(self, text):
-        """A line to the terminal."""
-        os.write(self.terminal, f"{text}\n".encode())
-
-    def require_no_traceback(self):
-        """Raises Failure where a handler printed a traceback since the last look."""
-        sys.stdout.flush()
-        with self.path.open("rb") as file:
-            file.seek(self._place)
-            text = file.read().decode(errors="replace")
-            self._place = file.tell()
-        if "Traceback" in text:
-            raise Failure(text[text.index("Traceback") :][-1500:])
 
 
 def plan(seed, steps):

@@ -13,7 +13,15 @@ IDNAME = re.compile(r'^\s+bl_idname = "vlm\.(\w+)"', re.MULTILINE)
 BUDGETS = {"target_triangles": lambda random: random.choice((1, 7, 30)), "samples_per_light": lambda random: 1}
 """Properties that any operator may have and whose whole range would take long."""
 
-OWN = {}
+
+def _finding(random):
+    """Some finding of the last check that names faces, where there is one."""
+    findings = bpy.context.scene.vlm.findings
+    named = [index for index, finding in enumerate(findings) if finding.marks]
+    return {"index": random.choice(named or [0])}
+
+
+OWN = {"select_offenders": _finding}
 """Parameters of single operators, by name: functions of the random numbers."""
 
 NOT_ALONE = {"open_documentation": "opens a browser"}

@@ -25,6 +25,7 @@ FIELDS = {"FLOAT_COLOR": "color", "BYTE_COLOR": "color", "FLOAT_VECTOR": "vector
 SIZES = {"FLOAT_COLOR": 4, "BYTE_COLOR": 4, "FLOAT_VECTOR": 3, "FLOAT2": 2, "INT32_2D": 2, "INT16_2D": 2}
 NUMBERS = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": np.bool_, "INT32_2D": np.int32, "INT16_2D": np.int32}
 LINKED = "linked from"
+MODE = "mode of"
 NOT_CONTENT = (".select", ".uv_select", ".vs.", ".es.", ".pn.")
 IDS = ("objects", "meshes", "materials", "collections", "scenes", "armatures", "lights", "images", "actions", "texts")
 
@@ -34,6 +35,7 @@ def content():
     found = {}
     for thing in bpy.data.objects:
         found[f"object {_name(thing)}"] = _object(thing)
+        found[f"{MODE} {_name(thing)}"] = thing.mode
     edited = {thing.data.name_full: thing for thing in bpy.data.objects if thing.mode == "EDIT" and _is_mesh(thing)}
     for mesh in bpy.data.meshes:
         found.update(_mesh(mesh, edited.get(mesh.name_full)))
@@ -55,9 +57,9 @@ def linked(contents):
     return {key: value for key, value in contents.items() if LINKED in key}
 
 
-def without_linked(contents):
-    """What is of this file of a content."""
-    return {key: value for key, value in contents.items() if LINKED not in key}
+def undoable(contents):
+    """What Blender's undo brings back of a content: what was linked stays loaded, paint modes are left."""
+    return {key: value for key, value in contents.items() if LINKED not in key and not key.startswith(MODE)}
 
 
 def _name(block):
@@ -77,7 +79,7 @@ def _object(thing):
     data = thing.data.name if thing.data else None
     homes = sorted(each.name for each in thing.users_collection)
     slots = [slot.material.name if slot.material else None for slot in thing.material_slots]
-    shown = (thing.hide_render, thing.display_type, thing.mode)
+    shown = (thing.hide_render, thing.display_type)
     return repr((thing.type, data, properties, groups, modifiers, parent, matrix, homes, slots, shown))
 
 
