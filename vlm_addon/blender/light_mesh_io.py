@@ -32,6 +32,7 @@ from .names import (
     is_light_mesh,
 )
 from .source_points import find_source_points, unsampled
+from .stored_links import read_links
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -214,5 +215,6 @@ def _read_lights(
         tag_ids=(np.zeros(count, np.int32) if tags is None else tags)[local.faces],
         dynamic=np.full(lights, bool(blender_object.get(DYNAMIC_PROPERTY, False)) or is_dynamic(original)),
         samples=unsampled(lights),
+        links=read_links(blender_object),
     )
     return _Read(read, original.name, local.faces if stored else np.full(lights, -1, np.int32))

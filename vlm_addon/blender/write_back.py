@@ -11,8 +11,9 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.errors import InvalidInput
+from ..core.light_links import make_links, no_links
 from ..core.light_mesh import VirtualLightMesh, require_valid
-from ..core.scene import Float64
+from ..core.scene import Float64, Int32
 from .color_space import convert, rec709_to_working
 from .light_meshes import set_sources
 from .names import (
@@ -28,19 +29,21 @@ from .names import (
     TAG_ATTRIBUTE,
     is_light_mesh,
 )
+from .stored_links import read_links, write_links
 
 
 def write_light_mesh(light_mesh: VirtualLightMesh, name: str, sources: Sequence[str] = (), scene: Any = None) -> Any:
     """The object that now holds `light_mesh` under `name`, in the collection of light meshes of `scene`.
 
-    A light mesh of that name is replaced: the object stays, with its links, modifiers, strength and hue, without a
-    rotation or scale of its own; its old mesh is removed where nothing else uses it. sources: names of the objects
-    that it was made from, kept for the artist. scene: the current one by default. Raises InvalidInput for lights that
-    `require_valid` refuses and for linked data, which cannot be changed.
+    A light mesh of that name is replaced: the object stays, with its collections, modifiers, strength, hue and the
+    links of tags that there still are, without a rotation or scale of its own; its old mesh is removed where nothing
+    else uses it. sources: names of the objects that it was made from, kept for the artist. scene: the current one by
+    default. Raises InvalidInput for lights that `require_valid` refuses and for linked data, which cannot be changed.
     """
     require_valid(light_mesh)
     scene = scene or bpy.context.scene
     existing = _existing(name, scene)
+    links = _links(existing, light_mesh)
     # Around their own middle, float32 coordinates are as exact as the placement behind the surface needs them.
     middle = _middle(light_mesh.vertices)
     mesh = _new_mesh(light_mesh, middle, name)
@@ -56,9 +59,17 @@ def write_light_mesh(light_mesh: VirtualLightMesh, name: str, sources: Sequence[
     blender_object[SCHEMA_PROPERTY] = SCHEMA_VERSION
     blender_object[DYNAMIC_PROPERTY] = bool(light_mesh.dynamic.any())
     set_sources(blender_object, sources, scene)
+    write_links(blender_object, links)
     blender_object.hide_render = True
     blender_object.display_type = "WIRE"
     return blender_object
+
+
+def _links(existing: Any | None, light_mesh: VirtualLightMesh) -> Int32:
+    """Those of the lights, beside those that an artist has made for ids that are still there."""
+    kept = no_links() if existing is None else read_links(existing)
+    kept = kept[np.isin(kept[:, 0], light_mesh.tag_ids)]
+    return make_links(np.concatenate([kept, light_mesh.links]))
 
 
 def _existing(name: str, scene: Any) -> Any | None:

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Let lights leave out visible objects."""
+
+import bpy
+from bpy.types import Operator
+
+from ..vlm_addon.blender import authoring, availability, links
+from ..vlm_addon.core.errors import VlmError
+
+
+class VLM_OT_link_receiver(Operator):  # noqa: N801 (Blender's naming of classes)
+    """Keep the bounce of the chosen lights off the selected visible objects; direct light and shadows stay"""
+
+    bl_idname = "vlm.link_receiver"
+    bl_label = "Leave Out Objects"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
+
+    receiver: bpy.props.StringProperty(
+        name="Object", description="Object that gets no bounce of these lights; empty: all selected visible objects"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return authoring.allow(cls, availability.light_faces_problem(context))
+
+    def execute(self, context):
+        try:
+            linked = links.link_receivers(context, links.named_receivers(context, self.receiver))
+        except VlmError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, links.linked_text(linked))
+        return {"FINISHED"}
