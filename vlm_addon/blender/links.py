@@ -118,13 +118,14 @@ def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
 
 def linked_text(linked: Linked) -> str:
     """A sentence with counts for who has linked."""
-    return f"{lights_text(linked.lights)} {_verb("leave", linked.lights)} out {_objects(linked.receivers)}{_more(linked)}"
+    verb = _verb("leave", linked.lights)
+    return f"{lights_text(linked.lights)} {verb} out {_objects(linked.receivers)}{_more(linked)}"
 
 
 def unlinked_text(unlinked: Linked) -> str:
     """A sentence with counts for who has unlinked."""
     where = _objects(unlinked.receivers) if unlinked.receivers else "everything"
-    return f"{lights_text(unlinked.lights)} {_verb("light", unlinked.lights)} {where} again{_more(unlinked)}"
+    return f"{lights_text(unlinked.lights)} {_verb('light', unlinked.lights)} {where} again{_more(unlinked)}"
 
 
 def _verb(verb: str, count: int) -> str:
