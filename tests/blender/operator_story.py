@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bpy
 from survival_actions import choose, edit, meshes
 from survival_log import Log
-from survival_parameters import OWN
+from survival_parameters import AFTER, OWN
 from survival_scene import build_start, load_extension
 from survival_state import content, difference
 
@@ -29,15 +29,6 @@ SITUATIONS = {
     "object edited": lambda lights, others: edit(others[0], Random(1)),
     "nothing selected": lambda lights, others: choose([]),
 }
-
-AFTER = {
-    "clear_bake": "bake",
-    "clear_tag": "assign_tag",
-    "stop_following": "follow_source",
-    "unlink_receiver": "link_receiver",
-    "unlock_lights": "lock_lights",
-}
-"""Operators that need what another one makes."""
 
 
 def prepare(folder):

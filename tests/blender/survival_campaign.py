@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bpy
 from survival_actions import ACTIONS, FILE_ACTIONS, to_object_mode
 from survival_log import Failure, Log
-from survival_parameters import NOT_ALONE, parameters, prepare
+from survival_parameters import AFTER, NOT_ALONE, parameters, prepare
 from survival_scene import PACKAGE, STARTS, build_start, load_extension
 from survival_state import (
     content,
@@ -150,8 +150,10 @@ class Sequence:
                 prepare(random)
             except RuntimeError:
                 self.results[f"{name} not prepared"] += 1
+            if name in AFTER:
+                self._call(AFTER[name], parameters(AFTER[name], random))
             if getattr(bpy.ops.vlm, name).poll():
-                return
+                break
 
     def _call(self, name, values):
         try:

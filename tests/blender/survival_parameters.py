@@ -6,6 +6,7 @@ import re
 import bpy
 from survival_actions import choose, edit, meshes, some
 from survival_scene import ROOT
+from survival_strokes import STROKES
 
 SMALL_INT, SMALL_FLOAT = 24, 4.0
 IDNAME = re.compile(r'^\s+bl_idname = "vlm\.(\w+)"', re.MULTILINE)
@@ -21,8 +22,17 @@ def _finding(random):
     return {"index": random.choice(named or [0])}
 
 
-OWN = {"select_offenders": _finding}
+OWN = {"select_offenders": _finding, **STROKES}
 """Parameters of single operators, by name: functions of the random numbers."""
+
+AFTER = {
+    "clear_bake": "bake",
+    "clear_tag": "assign_tag",
+    "stop_following": "follow_source",
+    "unlink_receiver": "link_receiver",
+    "unlock_lights": "lock_lights",
+}
+"""Operators that need what another one makes."""
 
 NOT_ALONE = {"open_documentation": "opens a browser"}
 """Operators that the campaign leaves out, with the reason."""
