@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
 
 from ..bake import Bake, BakeSettings, bake
+from ..core.bake_key import surface_hashes
 from ..core.errors import InvalidInput, VlmError
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..light_grid_bake import check_lights
 from .availability import has_geometry, light_mesh_objects, rendered_objects
+from .bake_state import set_made_from
 from .engine import ENGINE_ID
 from .extract import ExtractOptions, extract_scene, require_camera, require_lights
 from .findings import list_findings
@@ -30,7 +32,8 @@ NAME = "VLM"
 class Made:
     """A bake and where it goes: the scene's name, the light mesh's name and the objects that it was made from.
 
-    name is None where the scene keeps the light meshes that it has, which are at `origins`.
+    name is None where the scene keeps the light meshes that it has, which are at `origins`. made_from: hashes of the
+    surfaces, so that it can be told later whether they have changed.
     """
 
     bake: Bake
@@ -38,6 +41,7 @@ class Made:
     name: str | None = None
     sources: tuple[str, ...] = ()
     origins: LightOrigins | None = None
+    made_from: Mapping[str, str] = field(default_factory=dict)
 
 
 def from_selection(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
@@ -94,7 +98,11 @@ def _work_on_scene(context: Any, found: Extraction, settings: BakeSettings) -> C
 def _work(
     snapshot: SceneSnapshot, name: str, sources: tuple[str, ...], settings: BakeSettings
 ) -> Callable[[Progress], Made]:
-    return lambda progress: Made(bake(snapshot, None, settings, progress), snapshot.name, name, sources)
+    def work(progress: Progress) -> Made:
+        made = bake(snapshot, None, settings, progress)
+        return Made(made, snapshot.name, name, sources, made_from=surface_hashes(snapshot.meshes))
+
+    return work
 
 
 def write(made: Made) -> str:
@@ -108,6 +116,7 @@ def write(made: Made) -> str:
         list_findings(scene, findings, made.origins)
         return f"Kept the {count} that the scene has"
     written = write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
+    set_made_from(written, made.made_from)
     list_findings(scene, findings, origins_of(written))
     seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
     return f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s"

@@ -8,10 +8,10 @@ from contextlib import ExitStack
 
 import bpy
 
-from . import authoring, cli_commands, engine, engine_panels, migration, panels, properties, render_panels
+from . import authoring, bake_state, cli_commands, engine, engine_panels, migration, panels, properties, render_panels
 from .render_process import KEPT
 
-PARTS = (migration,)
+PARTS = (migration, bake_state)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()
