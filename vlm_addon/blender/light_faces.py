@@ -64,10 +64,19 @@ def select_faces(thing: Any, chosen: Bool) -> None:
     loops = np.repeat(chosen, read(mesh.polygons, "loop_total", np.int32))
     corners[read(mesh.loops, "vertex_index", np.int32)[loops]] = True
     edges[read(mesh.loops, "edge_index", np.int32)[loops]] = True
+    _drop_broken_edge_selection(mesh)
     mesh.vertices.foreach_set("select", corners)
     mesh.edges.foreach_set("select", edges)
     mesh.polygons.foreach_set("select", np.ascontiguousarray(chosen))
     mesh.update()
+
+
+def _drop_broken_edge_selection(mesh: Any) -> None:
+    """Blender 5.0 stores the selection of edges that it has computed itself as pairs of numbers, and crashes when it is
+    set; without one, the next to be set is made anew."""
+    stored = mesh.attributes.get(".select_edge")
+    if stored is not None and stored.data_type != "BOOLEAN":
+        mesh.attributes.remove(stored)
 
 
 def read_faces(thing: Any, name: str) -> npt.NDArray[Any]:
