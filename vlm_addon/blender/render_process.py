@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from threading import Lock
@@ -17,6 +18,7 @@ from ..core.progress import Progress
 from ..core.scene import SceneSnapshot
 from ..render.client import RenderProcess
 from ..render.frame_types import Frame, RenderSettings
+from . import render_log
 
 T = TypeVar("T")
 
@@ -38,7 +40,12 @@ class KeptRenderProcess:
         progress: Progress,
     ) -> Frame:
         """One picture. Raises VlmError; after a DeviceError the next picture starts a new process."""
-        return self._with_process(lambda process: process.render(snapshot, light_mesh, settings, progress))
+        start = time.perf_counter()
+        frame = self._with_process(lambda process: process.render(snapshot, light_mesh, settings, progress))
+        seconds = time.perf_counter() - start
+        picture = f"{settings.width} x {settings.height}, {settings.samples} samples, {settings.technique}"
+        render_log.note(f"{picture}: {seconds:.2f} s on {frame.device}")
+        return frame
 
     def bake_visibility(
         self, snapshot: SceneSnapshot, light_mesh: VirtualLightMesh, cells: int, points: int, progress: Progress
@@ -50,12 +57,18 @@ class KeptRenderProcess:
 
     def _with_process(self, work: Callable[[RenderProcess], T]) -> T:
         with self._lock:
-            if self._process is None:
-                self._process = RenderProcess(_python(), search_paths())
             try:
+                if self._process is None:
+                    render_log.shorten()
+                    render_log.note(f"renderer starts in {_python()}")
+                    self._process = RenderProcess(_python(), search_paths(), render_log.writable_path())
                 return work(self._process)
-            except DeviceError:
+            except DeviceError as error:
+                render_log.note(f"{type(error).__name__}: {error}")
                 self._close()
+                raise
+            except VlmError as error:
+                render_log.note(f"{type(error).__name__}: {error}")
                 raise
 
     def close(self) -> None:

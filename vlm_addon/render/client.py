@@ -50,8 +50,9 @@ T = TypeVar("T")
 class RenderProcess:
     """A renderer in a process of its own; a context manager. One picture at a time."""
 
-    def __init__(self, executable: Path | str, search_paths: Sequence[Path | str]) -> None:
-        """Starts the child. search_paths: folders that hold vlm_addon, numpy, moderngl and glcontext.
+    def __init__(self, executable: Path | str, search_paths: Sequence[Path | str], log: Path | None = None) -> None:
+        """Starts the child. search_paths: folders that hold vlm_addon, numpy, moderngl and glcontext. log: a file that
+        takes, after what it holds, what the child and its driver write; by default a temporary one.
 
         Raises DeviceError where there is no Python to start.
         """
@@ -63,7 +64,9 @@ class RenderProcess:
         self._number = 0
         paths = json.dumps([str(path) for path in search_paths])
         command = [str(executable), "-I", "-c", BOOTSTRAP, paths, str(self._folder)]
-        self._log = (self._folder / "log.txt").open("wb")
+        self._log_path = log if log is not None else self._folder / "log.txt"
+        self._log = self._log_path.open("ab")
+        self._log_start = self._log.tell()
         try:
             self._child = subprocess.Popen(
                 command,
@@ -270,6 +273,8 @@ class RenderProcess:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._child.wait(SHUTDOWN_S)
         self._log.flush()
-        lines = (self._folder / "log.txt").read_text(errors="replace").strip().splitlines()
+        with self._log_path.open("rb") as log:
+            log.seek(self._log_start)
+            lines = log.read().decode(errors="replace").strip().splitlines()
         last = f"; its last words: {lines[-1]}" if lines else ""
         return DeviceError(f"the render process ended with code {self._child.returncode}{last}; render again")
