@@ -3,10 +3,10 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, draw_erase, draw_operators, draw_points
+from ..vlm_addon.blender import authoring, availability, draw_erase, draw_gestures, draw_operators, draw_points
 
 
-class VLM_OT_draw_cut(draw_operators.Stroke, Operator):  # noqa: N801 (Blender's naming of classes)
+class VLM_OT_draw_cut(draw_gestures.CutGesture, draw_operators.Stroke, Operator):  # noqa: N801 (Blender's naming of classes)
     """Click points across lights of the chosen light meshes: they are cut in two along the way"""
 
     bl_idname = "vlm.draw_cut"

@@ -4,10 +4,10 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, draw_erase, draw_operators, draw_points
+from ..vlm_addon.blender import authoring, availability, draw_erase, draw_gestures, draw_operators, draw_points
 
 
-class VLM_OT_draw_erase(draw_operators.Stroke, Operator):  # noqa: N801 (Blender's naming of classes)
+class VLM_OT_draw_erase(draw_gestures.EraseGesture, draw_operators.Stroke, Operator):  # noqa: N801 (Blender's naming of classes)
     """Drag over lights of the chosen light meshes to delete them; locked ones are kept"""
 
     bl_idname = "vlm.draw_erase"

@@ -3,10 +3,10 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, draw_lights, draw_operators, draw_points
+from ..vlm_addon.blender import authoring, draw_gestures, draw_lights, draw_operators, draw_points
 
 
-class VLM_OT_draw_polygon(draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)
+class VLM_OT_draw_polygon(draw_gestures.PolygonGesture, draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)
     """Click the corners of a light on a surface, or drag around it. It takes colour and tag from the surface"""
 
     bl_idname = "vlm.draw_polygon"

@@ -4,10 +4,10 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, draw_lights, draw_operators, draw_points, draw_shapes
+from ..vlm_addon.blender import authoring, draw_gestures, draw_lights, draw_operators, draw_points, draw_shapes
 
 
-class VLM_OT_draw_rectangle(draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)
+class VLM_OT_draw_rectangle(draw_gestures.RectangleGesture, draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)
     """Drag a rectangle onto a surface, one light or a grid of them. They take colour and tag from the surface"""
 
     bl_idname = "vlm.draw_rectangle"

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import bmesh
@@ -13,6 +13,7 @@ from mathutils.bvhtree import BVHTree
 
 from ..core.errors import InvalidInput
 from ..core.scene import Float64
+from .draw_lights import light_count
 from .draw_mesh import edited, rings_of, vertices_world
 from .draw_surfaces import FACING_COSINE
 from .drawn_faces import plane_of
@@ -24,30 +25,47 @@ ON_PLANE_SHARE = 1e-6
 """Vertices within this share of a face's size of the cut count as on it."""
 
 
-def lights_near(thing: Any, points: Float64, normals: Float64, radius: float) -> set[int]:
-    """Rows of the lights within `radius` (m) of any of the points that face as the surface does there.
+@dataclass(frozen=True)
+class LightTree:
+    """The lights of a light mesh, to be found by where they are. The tree is in float32, around `middle`."""
 
-    points: (n, 3) world; normals: (n, 3), zero for either side.
-    """
-    rings = rings_of(thing)
-    if not rings:
-        return set()
-    middle = points.mean(axis=0)
-    vertices = vertices_world(thing) - middle
-    tree = BVHTree.FromPolygons(vertices.tolist(), rings)
-    turned = -1.0 if np.linalg.det(np.array(thing.matrix_world)) < 0.0 else 1.0
+    vertices: Float64
+    rings: list[list[int]]
+    tree: Any
+    middle: Float64
+    turned: float
 
-    def faces_alike(normal: Any, wanted: Float64) -> bool:
-        return not wanted.any() or turned * float(np.dot(normal, wanted)) > FACING_COSINE
+    @classmethod
+    def of(cls, thing: Any) -> LightTree:
+        """The lights as they are being edited."""
+        vertices, rings = vertices_world(thing), rings_of(thing)
+        middle = vertices.mean(axis=0) if len(vertices) else np.zeros(3)
+        tree = BVHTree.FromPolygons((vertices - middle).tolist(), rings) if rings else None
+        return cls(vertices, rings, tree, middle, -1.0 if np.linalg.det(np.array(thing.matrix_world)) < 0.0 else 1.0)
 
-    found: set[int] = set()
-    for point, wanted in zip(points - middle, normals, strict=True):
-        found |= {row for _, normal, row, _ in tree.find_nearest_range(point, radius) if faces_alike(normal, wanted)}
-        # Under a curved surface a light may lie deeper than the radius.
-        place, normal, row, distance = tree.ray_cast(point, -wanted) if wanted.any() else (None, None, 0, 0.0)
-        if place is not None and distance < _extent(vertices[rings[row]]) and faces_alike(normal, wanted):
-            found.add(row)
-    return found
+    def near(self, point: Float64, normal: Float64, radius: float) -> set[int]:
+        """Rows of the lights within `radius` (m) of a point, or straight under it, that face as the surface does.
+
+        normal: of the surface, zero for either side.
+        """
+        if self.tree is None:
+            return set()
+        local = Vector(point - self.middle)
+        found = {row for _, front, row, _ in self.tree.find_nearest_range(local, radius) if self._faces(front, normal)}
+        # Under a hollow surface a light may lie deeper than the radius.
+        if normal.any():
+            place, front, row, distance = self.tree.ray_cast(local, Vector(-normal))
+            if place is not None and distance < _extent(self.outline(row)) and self._faces(front, normal):
+                found.add(row)
+        return found
+
+    def outline(self, row: int) -> Float64:
+        """(k + 1, 3) world corners of a light, closed."""
+        ring = self.rings[row]
+        return self.vertices[[*ring, ring[0]]]
+
+    def _faces(self, front: Any, normal: Float64) -> bool:
+        return not normal.any() or self.turned * float(np.dot(front, normal)) > FACING_COSINE
 
 
 def erase(context: Any, points: Float64, normals: Float64, radius: float) -> str:
@@ -57,7 +75,22 @@ def erase(context: Any, points: Float64, normals: Float64, radius: float) -> str
     """
     if not len(points):
         raise InvalidInput("stroke", "it has no points", "give points on the surface")
-    return _change(context, lambda thing: lights_near(thing, points, normals, radius), _delete, "Erased")
+    require_all_editable(context)
+    erased = kept = left = 0
+    for thing in chosen_light_meshes(context):
+        tree, locked = LightTree.of(thing), _locked(thing)
+        found = {row for point, normal in zip(points, normals, strict=True) for row in tree.near(point, normal, radius)}
+        rows = found - locked
+        erased, kept, left = erased + len(rows), kept + len(found & locked), left + len(tree.rings) - len(rows)
+        if rows:
+            with edited(thing) as mesh:
+                bmesh.ops.delete(mesh, geom=[face for face in mesh.faces if face.index in rows], context="FACES")
+    if not erased and kept:
+        raise InvalidInput("stroke", f"the {kept} lights under it are locked", "unlock them first")
+    if not erased:
+        raise InvalidInput("stroke", "no light is under it", "select the light mesh, or use a larger radius")
+    locked_ones = f"; {kept} locked kept" if kept else ""
+    return f"Erased {light_count(erased)}{locked_ones}" + ("" if left else "; none is left")
 
 
 def cut(context: Any, points: Float64, normals: Float64) -> str:
@@ -88,28 +121,6 @@ def require_all_editable(context: Any) -> None:
     """Raises InvalidInput where one of the chosen light meshes cannot be changed."""
     for thing in chosen_light_meshes(context):
         require_editable(thing)
-
-
-def _change(
-    context: Any, find: Callable[[Any], set[int]], change: Callable[[Any, Sequence[Any]], None], verb: str
-) -> str:
-    require_all_editable(context)
-    changed = kept = left = 0
-    for thing in chosen_light_meshes(context):
-        found = find(thing)
-        rows = found - _locked(thing)
-        kept += len(found) - len(rows)
-        if rows:
-            with edited(thing) as mesh:
-                change(mesh, [face for face in mesh.faces if face.index in rows])
-                left += len(mesh.faces)
-        changed += len(rows)
-    if not changed:
-        if kept:
-            raise InvalidInput("stroke", f"the {kept} lights under it are locked", "unlock them first")
-        raise InvalidInput("stroke", "no light is under it", "select the light mesh, or use a larger radius")
-    locked = f"; {kept} locked ones kept" if kept else ""
-    return f"{verb} {changed} light{'s' if changed > 1 else ''}{locked}" + ("" if left else "; none is left")
 
 
 def _cut_along(
@@ -162,10 +173,6 @@ def _cut_plane(face: Any, matrix: Float64, start: Float64, end: Float64, normal:
 
 def _extent(points: Float64) -> float:
     return float(np.ptp(points, axis=0).max())
-
-
-def _delete(mesh: Any, faces: Sequence[Any]) -> None:
-    bmesh.ops.delete(mesh, geom=list(faces), context="FACES")
 
 
 def _locked(thing: Any) -> set[int]:

@@ -57,6 +57,47 @@ def strip(edge: Float64, path: Float64, normals: Float64) -> tuple[Float64, Corn
     return np.array(points), [[2 * at, 2 * at + 1, 2 * at + 3, 2 * at + 2] for at in range(len(path))]
 
 
+def simplified(outline: Float64, tolerance: float) -> list[int]:
+    """Rows of a closed outline, (n, 2), that keep it within `tolerance` (Ramer 1972, Douglas and Peucker 1973)."""
+    far = int(np.argmax(((outline - outline[0]) ** 2).sum(axis=1)))
+    closed = np.concatenate([outline, outline[:1]])
+    kept = {0, far}
+    spans = [(0, far), (far, len(outline))]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        way = closed[last] - closed[first]
+        length = float(np.linalg.norm(way))
+        offsets = closed[first + 1 : last] - closed[first]
+        across = np.abs(way[0] * offsets[:, 1] - way[1] * offsets[:, 0]) / length if length else _lengths(offsets)
+        row = int(np.argmax(across))
+        if across[row] > tolerance:
+            kept.add(first + 1 + row)
+            spans += [(first, first + 1 + row), (first + 1 + row, last)]
+    return sorted(kept)
+
+
+def way_in_steps(points: Float64, step: float) -> list[int]:
+    """Rows of (n, 3) points along a way that are about `step` apart, the last among them and the first not."""
+    kept, last = [], 0
+    for row in range(1, len(points)):
+        if np.linalg.norm(points[row] - points[last]) >= step:
+            kept.append(row)
+            last = row
+    end = len(points) - 1
+    if last == end or end < 1:
+        return kept
+    if kept and np.linalg.norm(points[end] - points[last]) < 0.5 * step:
+        kept[-1] = end
+        return kept
+    return [*kept, end]
+
+
+def _lengths(vectors: Float64) -> Float64:
+    return np.asarray(np.linalg.norm(vectors, axis=1), np.float64)
+
+
 def _level(normal: Float64) -> Float64:
     """A horizontal direction in an upright plane."""
     return np.array([-normal[1], normal[0], 0.0])

@@ -8,10 +8,21 @@ from contextlib import ExitStack
 
 import bpy
 
-from . import authoring, bake_state, cli_commands, engine, engine_panels, migration, panels, properties, render_panels
+from . import (
+    authoring,
+    bake_state,
+    cli_commands,
+    draw_tool,
+    engine,
+    engine_panels,
+    migration,
+    panels,
+    properties,
+    render_panels,
+)
 from .render_process import KEPT
 
-PARTS = (migration, bake_state)
+PARTS = (migration, bake_state, draw_tool)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()
