@@ -25,6 +25,7 @@ from .scene import Finding, Float64, Int32, Mesh
 from .settings import setting
 from .source_surface import SourceSurface, join_surface
 from .subdivide import subdivide_light_mesh
+from .withdrawal import withdraw
 
 __all__ = [
     "CreatedLightMesh",
@@ -139,8 +140,11 @@ def create_light_mesh(
     clock.start(0.7, "place")
     own = _region_rows(regions, ~regions.adopted, len(lights.triangles))
     placement = place_behind(lights.positions, lights.triangles, own, surface.corners)
+    clock.start(0.85, "withdraw")
+    withdrawal = withdraw(placement.positions, lights.triangles, own, surface.corners)
     clock.start(0.9, "sample")
-    light_mesh = _coloured(surface, lights, regions, placement.positions, settings)
+    placed = replace(lights, triangles=withdrawal.triangles)
+    light_mesh = _coloured(surface, placed, regions, withdrawal.positions, settings)
     clock.start(0.95, "check")
     in_front = share_in_front(light_mesh.corners, own, surface.corners)
     clock.stop()

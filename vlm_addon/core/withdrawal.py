@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights that shine on their own region, wherever their vertices go, withdraw into the body by themselves.
+
+To stand behind a region is not enough where it is hollow: its sides look across at the plane of the light. What no
+point of the region may see must lie behind the tangent planes of all of them, which is deep inside of the body, where
+there is little room. Such a light leaves its neighbours, shrinks and moves inwards, if need be to below the middle of
+its region, as little as possible; its strength makes up for its area. It stays inside: along its normal a ray must meet
+the back of the surface first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .form_factor import paired_form_factor
+from .mesh_topology import Bool, Int64, Rows, sum_by
+from .placement import insets
+from .sampling import sample_regions
+from .scene import Float64
+from .triangle_tree import TriangleTree, build_tree
+
+# Points of each region at which its own light is measured, first of all lights, then of those that may withdraw.
+ROUGH_POINTS, FINE_POINTS = 16, 48
+# Mean share of a light's radiosity that its own region may receive.
+ALLOWED = 2e-3
+# Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
+SHRINKS = (1.0, 0.7, 0.45, 0.25)
+DEPTHS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.6)
+# A light of this share of its region's area or less shrinks no further: few bright points light their surroundings ill.
+LEAST_AREA_SHARE = 1.0 / 48.0
+# Length of the mean normal of a region below which it faces nowhere.
+LEAST_FACING = 0.05
+LIGHTS_PER_BATCH = 256
+
+
+@dataclass(frozen=True)
+class Withdrawal:
+    """positions: (v, 3) float64, m. triangles: (n, 3) int64. moved: (n,) bool, lights that left their neighbours. own:
+    (n,) share of its radiosity that the region of each light receives from it."""
+
+    positions: Float64
+    triangles: Int64
+    moved: Bool
+    own: Float64
+
+
+def withdraw(positions: Float64, triangles: Int64, regions: Rows, source_corners: Float64) -> Withdrawal:
+    """The lights, those with own light moved to where they give less, as far as there is such a place.
+
+    positions: (v, 3), m. triangles: (n, 3). regions: source triangles of each light, rows of source_corners (t, 3, 3),
+    m. A light that moves gets vertices of its own after the others; vertices without any light are left out.
+    """
+    corners = positions[triangles]
+    own = own_shares(corners, regions, source_corners, ROUGH_POINTS)
+    offenders = np.flatnonzero(own > ALLOWED)
+    moved = np.zeros(len(corners), bool)
+    if not len(offenders):
+        return Withdrawal(positions, triangles, moved, own)
+    tree = build_tree(source_corners)
+    inset = insets(corners)
+    for first in range(0, len(offenders), LIGHTS_PER_BATCH):
+        rows = offenders[first : first + LIGHTS_PER_BATCH]
+        part = _rows_of(regions, rows)
+        placed, left = _best_places(corners[rows], inset[rows], part, source_corners, tree)
+        changed = left < own[rows]
+        corners[rows[changed]], own[rows[changed]], moved[rows[changed]] = placed[changed], left[changed], True
+    apart = triangles.copy()
+    apart[moved] = len(positions) + np.arange(3 * int(moved.sum())).reshape(-1, 3)
+    used, apart = np.unique(apart, return_inverse=True)
+    every = np.concatenate([positions, corners[moved].reshape(-1, 3)])
+    return Withdrawal(every[used], apart.reshape(-1, 3), moved, own)
+
+
+def own_shares(corners: Float64, regions: Rows, source_corners: Float64, points: int) -> Float64:
+    """(n,) mean irradiance of each region from its own light over the radiosity of the region, at `points` points."""
+    samples = sample_regions(source_corners, regions, np.full(len(corners), points))
+    light = np.repeat(np.arange(len(corners)), np.diff(samples.offsets))
+    factors = _seen_factors(samples.positions, samples.normals.astype(np.float64), corners, light)
+    shares = sum_by(light, factors * samples.weights, len(corners))
+    return shares * _areas_of(regions, source_corners) / np.maximum(_areas(corners), np.finfo(float).tiny)
+
+
+def _seen_factors(points: Float64, normals: Float64, corners: Float64, light: Int64) -> Float64:
+    """(p,) form factors of each point and the light beside it; most are nought and found to be by two planes."""
+    vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    in_front = np.einsum("ij,ij->i", vector[light], points - corners[light, 0]) > 0
+    rows = np.flatnonzero(in_front)
+    heights = np.einsum("ikj,ij->ik", corners[light[rows]] - points[rows, None], normals[rows])
+    rows = rows[heights.max(axis=1, initial=-1.0) > 0]
+    factors = np.zeros(len(points))
+    factors[rows] = paired_form_factor(points[rows], normals[rows], corners[light[rows]])
+    return factors
+
+
+def _best_places(
+    corners: Float64, inset: Float64, regions: Rows, source_corners: Float64, tree: TriangleTree
+) -> tuple[Float64, Float64]:
+    """(corners, own share) of the nearest place of each light with little own light, else of the one with the least.
+
+    Places that are not inside of the body are not taken.
+    """
+    places, effort = _places(corners, inset, regions, source_corners)
+    count, each = places.shape[:2]
+    flat = places.reshape(-1, 3, 3)
+    repeated = _rows_of(regions, np.repeat(np.arange(count), each))
+    own = own_shares(flat, repeated, source_corners, FINE_POINTS).reshape(count, each)
+    inside = _inside(flat, np.repeat(_spans(corners, regions, source_corners), each), tree).reshape(count, each)
+    # A light that is not inside as it stands may shrink there, too.
+    as_deep = np.arange(each) < len(SHRINKS) * (1 + len(DEPTHS))
+    as_deep &= np.arange(each) % (1 + len(DEPTHS)) == 0
+    inside |= ~inside[:, :1] & as_deep
+    # Of places inside those with little own light, of these the one with the least effort.
+    score = np.where(own <= ALLOWED, effort * ALLOWED, own + ALLOWED * (1.0 + effort))
+    score[~inside] = np.inf
+    best = score.argmin(axis=1)
+    row = np.arange(count)
+    left = np.where(inside[row, best], own[row, best], np.inf)
+    return places[row, best], left
+
+
+def _places(corners: Float64, inset: Float64, regions: Rows, source_corners: Float64) -> tuple[Float64, Float64]:
+    """((n, places, 3, 3) corners, (places,) effort below 1, rising with shrinking, depth and a change of middle).
+
+    The light as it stands first; the places of a size and a middle follow each other by depth.
+    """
+    regions_area = _areas_of(regions, source_corners)
+    least = np.sqrt(LEAST_AREA_SHARE * regions_area / np.maximum(_areas(corners), np.finfo(float).tiny))
+    shrinks = np.maximum(np.array(SHRINKS), np.minimum(1.0, least)[:, None])
+    places, steps = [], []
+    for change, start in enumerate((corners, _centred(corners, regions, source_corners))):
+        depths = _depths(start, inset, regions, source_corners)
+        normal, middle = _unit_normals(start), start.mean(axis=1, keepdims=True)
+        shrunk = middle[:, None] + shrinks[:, :, None, None] * (start - middle)[:, None]
+        places.append(shrunk[:, :, None] - (depths[:, :, None] * normal[:, None])[:, None, :, None, :])
+        steps.append(2 * change + np.arange(len(SHRINKS))[:, None] + np.arange(depths.shape[1])[None])
+    effort = np.stack(steps).ravel()
+    return np.stack(places, axis=1).reshape(len(corners), -1, 3, 3), effort / (effort.max() + 1.0)
+
+
+def _centred(corners: Float64, regions: Rows, source_corners: Float64) -> Float64:
+    """The lights below the middle of their regions, facing as these do on average, as large as they are."""
+    owner = np.repeat(np.arange(len(corners)), regions.lengths)
+    area = _areas(source_corners)[regions.values]
+    total = np.maximum(sum_by(owner, area, len(corners)), np.finfo(float).tiny)[:, None]
+
+    def mean(values: Float64) -> Float64:
+        return np.stack([sum_by(owner, values[:, axis] * area, len(corners)) for axis in range(3)], axis=1) / total
+
+    centre = mean(source_corners[regions.values].mean(axis=1))
+    facing = mean(_unit_normals(source_corners[regions.values]))
+    length = np.linalg.norm(facing, axis=1, keepdims=True)
+    facing = np.where(length > LEAST_FACING, facing / np.maximum(length, LEAST_FACING), _unit_normals(corners))
+    across = corners[:, 1] - corners[:, 0]
+    across = across - np.einsum("ij,ij->i", across, facing)[:, None] * facing
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+    # An equilateral triangle of the same area.
+    radius = np.sqrt(_areas(corners) * 4.0 / (3.0 * np.sqrt(3.0)))[:, None]
+    up = np.cross(facing, across)
+    turns = [(np.cos(angle), np.sin(angle)) for angle in (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)]
+    return np.stack([centre + radius * (cosine * across + sine * up) for cosine, sine in turns], axis=1)
+
+
+def _depths(corners: Float64, inset: Float64, regions: Rows, source_corners: Float64) -> Float64:
+    """(n, 1 + DEPTHS) m: how far back to move each light: not at all, or to behind its whole region and beyond."""
+    owner = np.repeat(np.arange(len(corners)), regions.lengths)
+    offset = source_corners[regions.values] - corners[owner, :1]
+    height = np.einsum("ikj,ij->ik", offset, _unit_normals(corners)[owner]).min(axis=1)
+    deepest = np.zeros(len(corners))
+    np.minimum.at(deepest, owner, height)
+    size = np.sqrt(_areas(corners))
+    return np.stack([np.zeros(len(corners)), *[inset - deepest + share * size for share in DEPTHS]], axis=1)
+
+
+def _spans(corners: Float64, regions: Rows, source_corners: Float64) -> Float64:
+    """(n,) m: farthest way from each light to a corner of its region, at least its own extent."""
+    owner = np.repeat(np.arange(len(corners)), regions.lengths)
+    way = np.linalg.norm(source_corners[regions.values] - corners.mean(axis=1)[owner, None], axis=2).max(axis=1)
+    farthest = 2.0 * np.sqrt(_areas(corners))
+    np.maximum.at(farthest, owner, way)
+    return farthest
+
+
+def _inside(corners: Float64, span: Float64, tree: TriangleTree) -> Bool:
+    """(n,) whether all corners and the middle of each light look along its normal at the back of a surface."""
+    normal = _unit_normals(corners)
+    points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+    way = np.broadcast_to((2.0 * span[:, None] * normal)[:, None], points.shape).reshape(-1, 3)
+    points = points.reshape(-1, 3)
+    met = tree.first_met(points, points + way)
+    facing = np.einsum("ij,ij->i", _unit_normals(tree.corners[met]), way) > 0
+    found: Bool = ((met >= 0) & facing).reshape(-1, 4).all(axis=1)
+    return found
+
+
+def _rows_of(regions: Rows, chosen: Int64) -> Rows:
+    """The rows `chosen` of a ragged table, in that order."""
+    _, values = regions.expand(chosen)
+    return Rows(values, np.concatenate([[0], np.cumsum(regions.lengths[chosen])]))
+
+
+def _areas_of(regions: Rows, source_corners: Float64) -> Float64:
+    owner = np.repeat(np.arange(len(regions.lengths)), regions.lengths)
+    return sum_by(owner, _areas(source_corners)[regions.values], len(regions.lengths))
+
+
+def _areas(corners: Float64) -> Float64:
+    areas: Float64 = 0.5 * np.linalg.norm(_vectors(corners), axis=1)
+    return areas
+
+
+def _vectors(corners: Float64) -> Float64:
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _unit_normals(corners: Float64) -> Float64:
+    normals = _vectors(corners)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
