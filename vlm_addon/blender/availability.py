@@ -113,6 +113,13 @@ def whole_light_mesh_problem(context: bpy.types.Context) -> str | None:
     return light_faces_problem(context)
 
 
+def light_scene_tags_problem(context: bpy.types.Context) -> str | None:
+    """Why the tags of the scene's light meshes cannot be repaired, or None."""
+    if context.mode != "OBJECT":
+        return "Leave this mode first (Tab): tags of whole scenes are repaired in Object Mode"
+    return check_problem(context)
+
+
 def check_problem(context: bpy.types.Context) -> str | None:
     """Why there is nothing to check, or None."""
     if not light_mesh_objects(context.scene):

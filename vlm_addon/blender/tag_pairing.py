@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tags found by place: each light with the faces that it stands for, so that these leave it out.
+
+In three steps: Blender's data are read (`read_tagging`), pairs are found without it (`pair`, `pair_thin`,
+`separate`), and what changes is written (`write_retagged`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.errors import InvalidInput
+from ..core.light_links import make_links, no_links
+from ..core.light_mesh import VirtualLightMesh, empty_light_mesh
+from ..core.mesh_topology import Bool
+from ..core.progress import Progress
+from ..core.scene import UNTAGGED, Int32
+from ..core.tag_pairs import TagUse, add_tags, related, unpaired
+from ..core.tags import separated_tags
+from ..core.thin_surface import thin_triangles
+from .availability import has_geometry
+from .light_colors import one_per_mesh
+from .light_faces import face_count, read_faces
+from .light_geometry import light_faces_in_world
+from .light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
+from .light_tags import counted, unused_tag, write_tags
+from .names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
+from .region_pairs import RegionPairs, SourceLights, region_pairs
+from .source_faces import NO_FACE, SourceFaces, read_source_faces
+from .stored_links import read_links, write_links
+
+
+@dataclass(frozen=True)
+class Tagging:
+    """Lights and visible faces with their tags.
+
+    names: of the light meshes. lights: the lights of each. light_tags: of all their faces, numbered through. links: of
+    each. source: the visible surface. unused: from here on no id is used in the file.
+    """
+
+    names: tuple[str, ...]
+    lights: tuple[SourceLights, ...]
+    light_tags: Int32
+    links: tuple[Int32, ...]
+    source: SourceFaces
+    unused: int
+
+    @property
+    def all_links(self) -> Int32:
+        """Each link holds for all lights of its id, wherever it is stored."""
+        return make_links(np.concatenate([no_links(), *self.links]))
+
+    def rows_of_triangles(self) -> Int32:
+        """(t,) row of each triangle's tag, over all meshes."""
+        return np.concatenate([np.zeros(0, np.int32), *self.source.rows])
+
+    def light_mesh_of(self) -> Int32:
+        """(n,) which light mesh each light is of."""
+        return np.repeat(np.arange(len(self.lights)), [each.faces.count for each in self.lights]).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Retagged:
+    """New tags and links in place of those of `before`; pairs: how many a face leaves out that were lit before."""
+
+    before: Tagging
+    light_tags: Int32
+    face_tags: Int32
+    links: tuple[Int32, ...]
+    pairs: int
+
+
+def read_tagging(context: Any, things: Sequence[Any], objects: Sequence[Any] = ()) -> Tagging:
+    """The light meshes `things` and what they stand for: their sources, or all that is visible where none is known.
+
+    objects: where given, no surface of others counts. Raises InvalidInput where a light mesh cannot be changed.
+    """
+    depsgraph = context.evaluated_depsgraph_get()
+    for thing in things:
+        require_editable(thing)
+    faces = [light_faces_in_world(thing, depsgraph) for thing in things]
+    tags = [read_faces(thing, TAG_ATTRIBUTE) for thing in things]
+    known = [_source_names(thing, context.scene) for thing in things]
+    source = read_source_faces()
+    wanted = {thing.name for thing in objects}
+    lights = []
+    for each, names in zip(faces, known, strict=True):
+        meshes = (
+            index
+            for index, owners in enumerate(source.owners)
+            if (not names or names & set(owners)) and (not wanted or wanted & set(owners))
+        )
+        lights.append(SourceLights(each, frozenset(meshes)))
+    return Tagging(
+        names=tuple(thing.name for thing in things),
+        lights=tuple(lights),
+        light_tags=np.concatenate([np.zeros(0, np.int32), *tags]),
+        links=tuple(read_links(thing) for thing in things),
+        source=source,
+        unused=unused_tag(),
+    )
+
+
+def chosen_work(context: Any, work: Callable[[Tagging, Progress], Retagged]) -> Callable[[Progress], Retagged]:
+    """`work` on the selected light meshes, with the selected visible objects alone if there are any."""
+    things = one_per_mesh(chosen_light_meshes(context))
+    objects = [thing for thing in context.selected_objects if has_geometry(thing)]
+    tagging = read_tagging(context, things, objects)
+    return lambda progress: work(tagging, progress)
+
+
+def scene_work(context: Any, work: Callable[[Tagging, Progress], Retagged]) -> Callable[[Progress], Retagged]:
+    """`work` on all light meshes of the scene that belong to this file."""
+    things = one_per_mesh([thing for thing in light_meshes(context.scene) if is_local(thing)])
+    tagging = read_tagging(context, things)
+    return lambda progress: work(tagging, progress)
+
+
+def _source_names(thing: Any, scene: Any) -> set[str]:
+    return {each.name for each in sources(thing, scene) if each is not None}
+
+
+def pair(tagging: Tagging, progress: Progress) -> Retagged:
+    """Every light leaves out the faces that it stands for. Raises Cancelled, and InvalidInput for too many links."""
+    return _paired(tagging, region_pairs(tagging.lights, tagging.source.snapshot.meshes, progress), None)
+
+
+def pair_thin(tagging: Tagging, progress: Progress) -> Retagged:
+    """The same for thin bodies and sheets seen from both sides alone (core/thin_surface.py)."""
+    meshes = tagging.source.snapshot.meshes
+    pairs = region_pairs(tagging.lights, meshes, progress)
+    found = thin_triangles(meshes, _as_light_mesh(tagging.lights), pairs.nearest)
+    needed = [thin | seen for thin, seen in zip(found.thin, found.two_sided, strict=True)]
+    return _paired(tagging, pairs, np.concatenate([np.zeros(0, bool), *needed]))
+
+
+def _paired(tagging: Tagging, pairs: RegionPairs, needed: Bool | None) -> Retagged:
+    rows = tagging.rows_of_triangles()[pairs.triangles]
+    kept = rows != NO_FACE
+    if needed is not None:
+        kept &= needed[pairs.triangles]
+    lights, faces = pairs.lights[kept], rows[kept].astype(np.int64)
+    links = tagging.all_links
+    lit = unpaired(lights, faces, tagging.light_tags, tagging.source.tags, links)
+    missing = len(np.unique(np.stack([lights[lit], faces[lit]], axis=1), axis=0))
+    found = add_tags(lights, faces, tagging.light_tags, tagging.source.tags, links, tagging.unused)
+    new_links = [
+        make_links(np.concatenate([before, found.links[np.isin(found.links[:, 0], tags)]]))
+        for before, tags in zip(tagging.links, _by_light_mesh(tagging, found.light_tags), strict=True)
+    ]
+    return Retagged(tagging, found.light_tags, found.face_tags, tuple(new_links), missing)
+
+
+def _by_light_mesh(tagging: Tagging, light_tags: Int32) -> list[Int32]:
+    ends = np.cumsum([each.faces.count for each in tagging.lights])
+    return np.split(light_tags, ends[:-1]) if len(ends) else []
+
+
+def _as_light_mesh(lights: Sequence[SourceLights]) -> VirtualLightMesh:
+    """The corners of all lights, which is all that looking for thin bodies needs."""
+    corners = np.concatenate([np.zeros((0, 3, 3)), *(each.faces.corners for each in lights)])
+    triangles = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+    return replace(empty_light_mesh(), vertices=corners.reshape(-1, 3), triangles=triangles)
+
+
+def separate(tagging: Tagging, progress: Progress) -> Retagged:
+    """Ids that light meshes or objects share which have nothing to do with each other are taken apart.
+
+    Light mesh and object are related by an id where a light of it stands for a face that leaves it out.
+    """
+    pairs = region_pairs(tagging.lights, tagging.source.snapshot.meshes, progress)
+    light_uses, face_uses, relations = _uses(tagging, pairs)
+    groups = related([*light_uses, *face_uses], relations)
+    lights, faces = sorted(light_uses, key=groups.__getitem__), sorted(face_uses, key=groups.__getitem__)
+    found = separated_tags(
+        [use.tag for use in lights],
+        [groups[use] for use in lights],
+        [use.tag for use in faces],
+        [groups[use] for use in faces],
+        tagging.unused,
+    )
+    new_light = dict(zip(lights, found.light_tags.tolist(), strict=True))
+    new_face = dict(zip(faces, found.face_tags.tolist(), strict=True))
+    light_mesh_of = tagging.light_mesh_of()
+    light_tags = [
+        new_light.get(TagUse(tag, _lights_owner(owner)), tag)
+        for tag, owner in zip(tagging.light_tags.tolist(), light_mesh_of.tolist(), strict=True)
+    ]
+    place_of = tagging.source.place_of(np.arange(len(tagging.source.tags)))
+    face_tags = [
+        new_face.get(TagUse(tag, _place_owner(place)), tag)
+        for tag, place in zip(tagging.source.tags.tolist(), place_of.tolist(), strict=True)
+    ]
+    links = tuple(_renamed(each, new_light, number) for number, each in enumerate(tagging.links))
+    changed = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
+    return Retagged(tagging, *changed, links, len(found.repaired))
+
+
+def _lights_owner(number: int) -> tuple[str, int]:
+    return "lights", number
+
+
+def _place_owner(number: int) -> tuple[str, int]:
+    return "place", number
+
+
+def _uses(tagging: Tagging, pairs: RegionPairs) -> tuple[set[TagUse], set[TagUse], list[tuple[TagUse, TagUse]]]:
+    """Uses of ids by lights and by faces, and which of them belong together.
+
+    A linked pair is one of both ids: the lights carry the id of the faces, too, and the other way round.
+    """
+    light_mesh_of, tags = tagging.light_mesh_of(), tagging.source.tags
+    rows = tagging.rows_of_triangles()[pairs.triangles]
+    known = rows != NO_FACE
+    lights, faces = pairs.lights[known], rows[known].astype(np.int64)
+    out = ~unpaired(lights, faces, tagging.light_tags, tags, tagging.all_links)
+    lights, faces = lights[out], faces[out]
+    places = tagging.source.place_of(faces)
+    joined = np.stack([tagging.light_tags[lights], light_mesh_of[lights], tags[faces], places], axis=1)
+    light_uses = _all_uses(tagging.light_tags, light_mesh_of, _lights_owner)
+    places_of_all = tagging.source.place_of(np.arange(len(tags)))
+    face_uses = _all_uses(tags, places_of_all, _place_owner)
+    relations = []
+    for light_tag, light_mesh, face_tag, place in np.unique(joined, axis=0).tolist():
+        for tag in {light_tag, face_tag}:
+            of_lights, of_faces = TagUse(tag, _lights_owner(light_mesh)), TagUse(tag, _place_owner(place))
+            light_uses.add(of_lights)
+            face_uses.add(of_faces)
+            relations.append((of_lights, of_faces))
+    return light_uses, face_uses, relations
+
+
+def _all_uses(tags: np.ndarray, owners: np.ndarray, name: Any) -> set[TagUse]:
+    found = np.unique(np.stack([tags, owners], axis=1)[tags != UNTAGGED], axis=0)
+    return {TagUse(tag, name(owner)) for tag, owner in found.tolist()}
+
+
+def _renamed(links: Int32, new_light: dict[TagUse, int], number: int) -> Int32:
+    """Links of one light mesh with the ids that its lights, and what they are linked to, have now."""
+    owner = _lights_owner(number)
+    pairs = [[new_light.get(TagUse(tag, owner), tag) for tag in link] for link in links.tolist()]
+    return make_links(np.array([each for each in pairs if UNTAGGED not in each], np.int64).reshape(-1, 2))
+
+
+@dataclass(frozen=True)
+class Written:
+    """How many lights, faces and objects as a whole got another tag, and how many links there are more."""
+
+    lights: int
+    faces: int
+    objects: int
+    links: int
+
+
+def write_retagged(context: Any, made: Retagged) -> Written:
+    """Write new tags and links. Raises InvalidInput where something changed since; nothing is changed then."""
+    before = made.before
+    light_tags = _by_light_mesh(before, made.light_tags)
+    things = [
+        _unchanged_light_mesh(context.scene, name, tags) for name, tags in zip(before.names, light_tags, strict=True)
+    ]
+    places = [place for place in before.source.places if _differs(made, place.first, place.count)]
+    for place in places:
+        _require_unchanged(place.name, place.count if place.of_mesh else None)
+    for thing, tags, old, links in zip(things, light_tags, before.links, made.links, strict=True):
+        write_tags(thing, tags)
+        if not np.array_equal(old, links):
+            write_links(thing, links)
+    for place in places:
+        thing = bpy.data.objects[place.name, None]
+        if place.of_mesh:
+            write_tags(thing, made.face_tags[place.first : place.first + place.count])
+        else:
+            thing[TAG_PROPERTY] = int(made.face_tags[place.first])
+            thing.update_tag()
+    changed = made.face_tags != before.source.tags
+    of_mesh = np.repeat([place.of_mesh for place in before.source.places], [p.count for p in before.source.places])
+    return Written(
+        lights=int((made.light_tags != before.light_tags).sum()),
+        faces=int((changed & of_mesh).sum()),
+        objects=int((changed & ~of_mesh).sum()),
+        links=sum(map(len, made.links)) - sum(map(len, before.links)),
+    )
+
+
+def _differs(made: Retagged, first: int, count: int) -> bool:
+    rows = slice(first, first + count)
+    return not np.array_equal(made.face_tags[rows], made.before.source.tags[rows])
+
+
+def _unchanged_light_mesh(scene: Any, name: str, tags: Int32) -> Any:
+    thing = scene.objects.get(name)
+    if thing is None or not is_light_mesh(thing) or face_count(thing) != len(tags):
+        raise InvalidInput(f"light mesh {name!r}", "it was changed while its lights were paired", "pair them again")
+    require_editable(thing)
+    return thing
+
+
+def _require_unchanged(name: str, faces: int | None) -> None:
+    thing = bpy.data.objects.get((name, None))
+    if thing is None or (faces is not None and (not is_local(thing) or face_count(thing) != faces)):
+        raise InvalidInput(f"object {name!r}", "it was changed while lights were paired", "pair them again")
+
+
+def paired_text(made: Retagged, written: Written) -> str:
+    """A sentence with counts."""
+    source = made.before.source
+    parts = [counted(written.lights, "light"), counted(written.faces, "face"), counted(written.objects, "whole object")]
+    changed = ", ".join(part for part in parts if part) or "Nothing"
+    told = (
+        f"{changed} got tags for {counted(made.pairs, 'pair') or 'no pair'} of light and face; {written.links:+,} links"
+    )
+    for names, why in (
+        (source.as_wholes, "as a whole, for lack of faces behind its modifiers"),
+        (source.read_only, "left out, since it is linked from another file"),
+    ):
+        if names:
+            told += f"; {names[0]!r}{f' and {len(names) - 1} more' if len(names) > 1 else ''} {why}"
+    return told
+
+
+def repaired_text(made: Retagged, written: Written) -> str:
+    """A sentence with counts."""
+    if not made.pairs:
+        return "No tag id is shared by what does not belong together"
+    parts = [counted(written.lights, "light"), counted(written.faces, "face"), counted(written.objects, "whole object")]
+    changed = ", ".join(part for part in parts if part) or "nothing"
+    return f"{counted(made.pairs, 'tag id')} shared: {changed} changed"

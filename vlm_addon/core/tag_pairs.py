@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tags for pairs of a light and a face that it stands for, beside tags that artists have given already.
+
+A face leaves out a light where both carry one tag id, or where the light's id is linked to the face's (seed 002,
+section 3.4; tags.py). What carries a tag keeps it; what is missing is added with as little else left out as possible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .light_links import leaves_out, make_links
+from .mesh_topology import Bool, Int64
+from .scene import UNTAGGED, Int32
+from .tags import RegionTags, region_tags
+
+
+def add_tags(
+    lights: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    light_tags: npt.ArrayLike,
+    face_tags: npt.ArrayLike,
+    links: Int32,
+    first_tag: int,
+) -> RegionTags:
+    """Tags and links with which each face leaves out each light that it is paired with.
+
+    lights, faces: (p,) rows of the pairs, in any order and number. light_tags: (n,), face_tags: (f,) int32, kept where
+    they are not UNTAGGED. links: (k, 2), kept. first_tag: from here on no id is used. A light without a tag takes that
+    of its faces where they all carry the same, else one of its own; a face without a tag takes that of its lights
+    where they all carry the same, else one of its own for this set of tags, to which each is linked. Where both carry
+    tags already, these are linked. Raises InvalidInput where there would be too many links.
+    """
+    lights, faces = np.asarray(lights, np.int64), np.asarray(faces, np.int64)
+    light_tags, face_tags = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
+    _take_common_tag(lights, faces, light_tags, face_tags)
+    open_ = unpaired(lights, faces, light_tags, face_tags, links)
+    lights, faces = lights[open_], faces[open_]
+    fresh = np.unique(lights[light_tags[lights] == UNTAGGED])
+    light_tags[fresh] = first_tag + np.arange(len(fresh))
+    bare = face_tags[faces] == UNTAGGED
+    between = np.stack([light_tags[lights[~bare]], face_tags[faces[~bare]]], axis=1)
+    added = _tag_faces(light_tags[lights[bare]], faces[bare], face_tags, first_tag + len(fresh))
+    everything = np.concatenate([np.asarray(links, np.int64).reshape(-1, 2), between, added])
+    return RegionTags(light_tags, face_tags, make_links(everything))
+
+
+def _take_common_tag(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32) -> None:
+    """Give lights without a tag that of their faces, where all of these carry one and the same."""
+    low = np.full(len(light_tags), np.iinfo(np.int32).max, np.int64)
+    high = np.full(len(light_tags), UNTAGGED, np.int64)
+    np.minimum.at(low, lights, face_tags[faces])
+    np.maximum.at(high, lights, face_tags[faces])
+    same = (low == high) & (high != UNTAGGED) & (light_tags == UNTAGGED)
+    light_tags[same] = high[same]
+
+
+def _tag_faces(tags: Int32, faces: Int64, face_tags: Int32, first_tag: int) -> Int64:
+    """Tag the faces of pairs (tag of a light, face without a tag); returns the links for it, (k, 2)."""
+    if not len(faces):
+        return np.zeros((0, 2), np.int64)
+    known, group = np.unique(tags, return_inverse=True)
+    rows, place = np.unique(faces, return_inverse=True)
+    # region_tags numbers groups from 1, and sets of them after that: the groups are the tags that there are.
+    found = region_tags(group, place, 1, len(known), len(rows), np.arange(len(known)))
+    sets = np.arange(max(int(found.face_tags.max()) - len(known), 0))
+    names = np.concatenate([[UNTAGGED], known.astype(np.int64), first_tag + sets])
+    face_tags[rows] = names[found.face_tags]
+    return names[found.links].reshape(-1, 2)
+
+
+def unpaired(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32, links: Int32) -> Bool:
+    """(p,) whether the face of each pair is still lit by the light of the pair."""
+    return ~leaves_out(links, light_tags[lights], face_tags[faces])
+
+
+@dataclass(frozen=True)
+class TagUse:
+    """One object that carries a tag id: `owner` names it, whether by lights, faces or links."""
+
+    tag: int
+    owner: Hashable
+
+
+def related(uses: Iterable[TagUse], pairs: Iterable[tuple[TagUse, TagUse]]) -> dict[TagUse, int]:
+    """A number for each use, the same for those of one id that `pairs` connect, directly or over others."""
+    parent = {use: use for use in uses}
+
+    def root(use: TagUse) -> TagUse:
+        while parent[use] != use:
+            parent[use] = parent[parent[use]]
+            use = parent[use]
+        return use
+
+    for one, other in pairs:
+        parent[root(other)] = root(one)
+    numbers: dict[TagUse, int] = {}
+    return {use: numbers.setdefault(root(use), len(numbers)) for use in parent}
