@@ -19,10 +19,11 @@ from . import (
     panels,
     properties,
     render_panels,
+    setting_presets,
 )
 from .render_process import KEPT
 
-PARTS = (migration, bake_state, draw_tool)
+PARTS = (migration, bake_state, draw_tool, setting_presets)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()
