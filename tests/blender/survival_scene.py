@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import bpy
+from survival_state import ORIGIN
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "vlm_extension"
@@ -33,6 +34,8 @@ def build_start(name, path):
     _room()
     _lamp_and_camera(scene)
     {"room": lambda: None, "models": _models, "figure": _figure}[name]()
+    for number, thing in enumerate(each for each in bpy.data.objects if each.type == "MESH"):
+        thing[ORIGIN] = f"{name} {number}"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
 
 

@@ -14,6 +14,11 @@ objects carries its mark as a custom property, and so do its copies."""
 STAMPED = "survival_stamped"
 """Custom property of each light mesh: what it said of its sources when they were marked."""
 MARK = "survival_mark"
+NO_MARK = "-"
+ORIGIN = "survival_origin"
+"""Custom property of each visible object of a start scene: a name of its own that all its copies share."""
+ORIGINS = "survival_origins"
+"""Custom property of each light mesh: the origins of its sources, one a line."""
 FACE_TYPES = {
     "vlm_color": "FLOAT_COLOR",
     "vlm_emission": "FLOAT_COLOR",
@@ -176,13 +181,12 @@ def _mark(thing, scene, numbers):
     if thing.get(STAMPED) == said:
         return False
     objects = [scene.objects.get(name) for name in thing["vlm_sources"].split("\n")]
-    marks = []
-    for each in objects:
-        mark = f"{MARK} {next(numbers)}"
-        marks.append(mark)
-        if each is not None and each.library is None:
+    marks = [NO_MARK if each is None or each.library else f"{MARK} {next(numbers)}" for each in objects]
+    for mark, each in zip(marks, objects, strict=True):
+        if mark != NO_MARK:
             each[mark] = True
     thing[SOURCES], thing[STAMPED] = "\n".join(marks), said
+    thing[ORIGINS] = "\n".join(NO_MARK if each is None else str(each.get(ORIGIN, NO_MARK)) for each in objects)
     return True
 
 
@@ -201,13 +205,16 @@ def faults(light_meshes_module):
 def _light_mesh_faults(thing, scene, light_meshes_module):
     found = []
     resolved = light_meshes_module.sources(thing, scene)
-    for mark, source in zip(marks_of(thing), resolved, strict=False):
+    ids = [*thing.get("vlm_source_ids", ()), *len(resolved) * [0]]
+    origins = str(thing.get(ORIGINS, "")).split("\n")
+    for mark, source, number, origin in zip(marks_of(thing), resolved, ids, origins, strict=False):
         there = [each for each in scene.objects if mark in each and not is_light_mesh(each)]
-        if there and source is None:
-            found.append(f"{thing.name!r} does not find its source {there[0].name!r}")
-        elif there and source not in there:
+        same = [each for each in there if each.get("vlm_id", 0) in (0, number)]
+        if source is None and same:
+            found.append(f"{thing.name!r} does not find its source {same[0].name!r}")
+        elif source is not None and there and source not in there:
             found.append(f"{thing.name!r} takes {source.name!r} for its source {there[0].name!r}")
-        elif not there and source is not None:
+        elif source is not None and not there and NO_MARK not in (mark, origin) and source.get(ORIGIN) != origin:
             found.append(f"{thing.name!r} takes {source.name!r} for a source that is gone")
     return found
 

@@ -9,7 +9,8 @@ object share it, or the object is linked and could not be given one, its name de
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Container, Iterable, Sequence
 from typing import Any
 
 import bpy
@@ -53,7 +54,8 @@ def set_sources(thing: Any, names: Sequence[str], scene: Any) -> None:
     """Remember the objects of `scene` that the light mesh was made from; those that can be written get an id."""
     found = [scene.objects.get(name) for name in names]
     thing[SOURCES_PROPERTY] = "\n".join(names)
-    thing[SOURCE_IDS_PROPERTY] = [NO_ID if source is None else ensure_id(source) for source in found]
+    counts = _id_counts()
+    thing[SOURCE_IDS_PROPERTY] = [NO_ID if source is None else ensure_id(source, counts) for source in found]
 
 
 def source_names(thing: Any) -> list[str]:
@@ -89,22 +91,48 @@ def light_meshes_of(source: Any, scene: Any) -> list[Any]:
     return [thing for thing in light_meshes(scene) if source in sources(thing, scene)]
 
 
-def ensure_id(thing: Any) -> int:
-    """The id of an object, given now where it has none; NO_ID where it is linked and cannot be written.
+def ensure_id(thing: Any, counts: Counter[int] | None = None) -> int:
+    """The id that this object alone has; NO_ID where it has none and is linked, so that it cannot be written.
 
-    The same file gives the same ids: they come from names.
+    Copies share the id of their original until a light mesh is made of one of them: it gets one of its own then, and
+    light meshes that took it for their source learn it. The same file gives the same ids: they come from names.
+    counts: how many objects have each id, for callers that ask for many; it is kept up to date.
     """
-    if ID_PROPERTY in thing:
-        return int(thing[ID_PROPERTY])
+    counts = _id_counts() if counts is None else counts
     if not is_local(thing):
-        return NO_ID
-    thing[ID_PROPERTY] = unused_id(thing.name)
-    return int(thing[ID_PROPERTY])
+        return int(thing.get(ID_PROPERTY, NO_ID))
+    shared = int(thing.get(ID_PROPERTY, NO_ID))
+    if counts[shared] == 1:
+        return shared
+    known = _references(thing) if shared != NO_ID else []
+    number = unused_id(thing.name, counts)
+    thing[ID_PROPERTY] = number
+    counts.subtract([shared])
+    counts[number] += 1
+    for light_mesh, index in known:
+        ids = [int(value) for value in light_mesh[SOURCE_IDS_PROPERTY]]
+        ids[index] = number
+        light_mesh[SOURCE_IDS_PROPERTY] = ids
+    return number
 
 
-def unused_id(name: str) -> int:
-    """An id that no object of the file has, made from `name`."""
-    taken = {int(each[ID_PROPERTY]) for each in bpy.data.objects if ID_PROPERTY in each}
+def _id_counts() -> Counter[int]:
+    return Counter(int(each[ID_PROPERTY]) for each in bpy.data.objects if ID_PROPERTY in each)
+
+
+def _references(thing: Any) -> list[tuple[Any, int]]:
+    """(light mesh, which of its sources) wherever a light mesh of this file knows `thing` by id."""
+    return [
+        (light_mesh, index)
+        for scene in bpy.data.scenes
+        for light_mesh in light_meshes(scene)
+        for index, source in enumerate(sources(light_mesh, scene))
+        if source == thing and is_local(light_mesh) and index < len(light_mesh.get(SOURCE_IDS_PROPERTY, ()))
+    ]
+
+
+def unused_id(name: str, taken: Container[int]) -> int:
+    """An id that is not in `taken`, made from `name`."""
     number = zlib.crc32(name.encode()) % LARGEST_ID + 1
     while number in taken:
         number = number % LARGEST_ID + 1

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A light mesh finds the objects that it was made from by ids of their own, whatever they and their copies are called."""
+
+import bpy
+import pytest
+
+from vlm_addon.blender.light_meshes import ensure_id, light_meshes_of, set_sources, sources
+
+
+@pytest.fixture
+def make_lights(make_plane, scene):
+    """make_lights(name, *sources): a light mesh made of the objects of these names."""
+
+    def make(name, *names):
+        lights = make_plane(name)
+        lights["vlm_schema"] = 2
+        set_sources(lights, names, scene)
+        return lights
+
+    return make
+
+
+@pytest.fixture
+def copy(scene):
+    """copy(thing): a copy in the scene, as Shift+D makes it."""
+
+    def make(thing):
+        made = thing.copy()
+        scene.collection.objects.link(made)
+        return made
+
+    return make
+
+
+def swap_names(one, other):
+    names = one.name, other.name
+    one.name = "neither"
+    other.name, one.name = names
+
+
+def test_renamed_sources_are_found(make_lights, make_cube, scene):
+    cube = make_cube("Cube")
+    lights = make_lights("Lights", "Cube")
+    cube.name = "Wall"
+    make_cube("Cube")
+    assert sources(lights, scene) == [cube]
+    assert light_meshes_of(cube, scene) == [lights]
+
+
+def test_the_original_is_preferred_to_its_copies(make_lights, make_cube, copy, scene):
+    cube = make_cube("Cube")
+    lights = make_lights("Lights", "Cube")
+    copy(cube)
+    assert sources(lights, scene) == [cube]
+
+
+def test_a_copy_that_gets_lights_of_its_own_is_told_from_the_original_whatever_they_are_called(
+    make_lights, make_cube, copy, scene
+):
+    cube = make_cube("Cube")
+    lights = make_lights("Lights", "Cube")
+    other = copy(cube)
+    lights_of_other = make_lights("Lights of copy", other.name)
+    swap_names(cube, other)
+    assert sources(lights, scene) == [cube]
+    assert sources(lights_of_other, scene) == [other]
+
+
+def test_an_original_that_gets_an_id_of_its_own_is_still_known_to_its_first_light_mesh(
+    make_lights, make_cube, copy, scene
+):
+    cube = make_cube("Cube")
+    lights = make_lights("Lights", "Cube")
+    other = copy(cube)
+    again = make_lights("Lights again", "Cube")
+    swap_names(cube, other)
+    assert sources(lights, scene) == sources(again, scene) == [cube]
+
+
+def test_ids_that_no_copy_shares_stay(make_cube):
+    cube = make_cube("Cube")
+    number = ensure_id(cube)
+    assert ensure_id(cube) == number
+
+
+def test_sources_that_are_gone_are_none(make_lights, make_cube, scene):
+    cube = make_cube("Cube")
+    make_cube("Wall")
+    lights = make_lights("Lights", "Cube", "Wall")
+    bpy.data.objects.remove(cube)
+    make_cube("Cube")["vlm_id"] = 5
+    assert sources(lights, scene) == [None, bpy.data.objects["Wall"]]
