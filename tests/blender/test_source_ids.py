@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A light mesh finds the objects that it was made from by ids of their own, whatever they and their copies are called."""
+"""A light mesh finds the objects that it was made from by ids of their own, whatever they or copies are called."""
 
 import bpy
 import pytest
