@@ -25,5 +25,6 @@ class VLM_OT_bake(LongOperator, Operator):  # noqa: N801 (Blender's naming of cl
         return authoring.from_visible_scene(context, settings_from(self, BakeSettings))
 
     def finish(self, context, result):
-        findings = len(result.bake.findings)
-        self.report({"WARNING" if findings else "INFO"}, f"{authoring.write(result)}; {findings} findings")
+        count = len(result.bake.findings)
+        told = f"{authoring.write(result)}; {authoring.counted_findings(count)}"
+        self.report({"WARNING" if count else "INFO"}, told)

@@ -4,10 +4,10 @@
 from bpy.types import Operator
 
 from ..vlm_addon.blender import authoring, availability
-from ..vlm_addon.core.errors import VlmError
+from ..vlm_addon.blender.long_operator import LongOperator
 
 
-class VLM_OT_check(Operator):  # noqa: N801 (Blender's naming of classes)
+class VLM_OT_check(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)
     """Look for what is wrong with the virtual light meshes; the findings are listed in the sidebar"""
 
     bl_idname = "vlm.check"
@@ -18,13 +18,11 @@ class VLM_OT_check(Operator):  # noqa: N801 (Blender's naming of classes)
     def poll(cls, context):
         return authoring.allow(cls, availability.check_problem(context))
 
-    def execute(self, context):
-        try:
-            findings = authoring.check(context)
-        except VlmError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        for finding in findings:
+    def prepare(self, context):
+        return authoring.check(context)
+
+    def finish(self, context, result):
+        authoring.list_checked(result)
+        for finding in result.findings:
             self.report({"WARNING"}, str(finding))
-        self.report({"INFO"}, f"{len(findings)} findings")
-        return {"FINISHED"}
+        self.report({"INFO"}, authoring.counted_findings(len(result.findings)))

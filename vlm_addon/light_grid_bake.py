@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .core.finding_kinds import BROKEN
 from .core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings, LightGrid
 from .core.light_grid_error import GridError, grid_error
 from .core.light_mesh import VirtualLightMesh, empty_light_mesh
@@ -150,6 +151,6 @@ def check_lights(
     settings: None where all lights are summed. Raises InvalidInput, Cancelled.
     """
     findings = check_light_mesh(light_mesh if light_mesh is not None else empty_light_mesh(), snapshot.meshes)
-    if not light_mesh or settings is None:
+    if not light_mesh or settings is None or any(finding.kind in BROKEN for finding in findings):
         return findings
     return (*findings, *bake_light_grid(snapshot, light_mesh, settings, progress).findings)

@@ -192,6 +192,8 @@ def story():
 
     with in_view():
         STORY["check"] = sorted(bpy.ops.vlm.check("INVOKE_DEFAULT"))
+    yield from until(nothing_runs)
+    with in_view():
         STORY["light scene"] = sorted(bpy.ops.vlm.light_scene("INVOKE_DEFAULT"))
     yield from until(picture_is_shown)
     redraw()

@@ -107,9 +107,7 @@ def _work(
 
 def write(made: Made) -> str:
     """Put what was made into Blender's data, with its findings; returns a sentence with counts."""
-    scene = bpy.data.scenes.get(made.scene)
-    if scene is None:
-        raise InvalidInput(f"scene {made.scene!r}", "it is gone", "create the light mesh again")
+    scene = require_scene(made.scene)
     findings = (*_counted_twice(scene, made), *made.bake.findings)
     count = lights(len(made.bake.light_mesh))
     if made.name is None or made.bake.creation is None:
@@ -134,17 +132,48 @@ def _counted_twice(scene: Any, made: Made) -> list[Finding]:
     return findings
 
 
-def check(context: Any) -> tuple[Finding, ...]:
-    """What is wrong with the light meshes and the light grid of the scene, and what extraction had to approximate; also
-    listed."""
-    for thing in context.objects_in_mode:
-        thing.update_from_editmode()
-    found = extract()
+@dataclass(frozen=True)
+class Checked:
+    """What a check found, and where the lights that it names are stored."""
+
+    scene: str
+    findings: tuple[Finding, ...]
+    origins: LightOrigins | None
+
+
+def check(context: Any) -> Callable[[Progress], Checked]:
+    """Work that looks for what is wrong with the light meshes and the light grid of the scene, and what extraction had
+    to approximate."""
+    found = extract_edited(context)
     settings = scene_grid_settings(context.scene)
     budget = over_budget(context.scene, len(found.light_mesh or ()))
-    findings = (*check_lights(found.snapshot, found.light_mesh, settings), *budget, *found.snapshot.findings)
-    list_findings(context.scene, findings, found.origins)
-    return findings
+    notes = (*budget, *found.snapshot.findings)
+
+    def work(progress: Progress) -> Checked:
+        findings = check_lights(found.snapshot, found.light_mesh, settings, progress)
+        return Checked(found.snapshot.name, (*findings, *notes), found.origins)
+
+    return work
+
+
+def list_checked(checked: Checked) -> None:
+    """Keep what a check found in its scene. Raises InvalidInput where that is gone."""
+    list_findings(require_scene(checked.scene), checked.findings, checked.origins)
+
+
+def require_scene(name: str) -> Any:
+    """The scene of that name. Raises InvalidInput where it is gone."""
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        raise InvalidInput(f"scene {name!r}", "it is gone", "undo, or do it again in another scene")
+    return scene
+
+
+def extract_edited(context: Any) -> Extraction:
+    """The scene with the meshes in edit mode as they are now, and lights with whatever values they have."""
+    for thing in context.objects_in_mode:
+        thing.update_from_editmode()
+    return extract(broken_values=True)
 
 
 def over_budget(scene: Any, count: int) -> list[Finding]:
@@ -196,3 +225,8 @@ def lights(count: int) -> str:
 def faces(count: int) -> str:
     """A number of faces in words."""
     return "1 face" if count == 1 else f"{count:,} faces"
+
+
+def counted_findings(count: int) -> str:
+    """A number of findings in words."""
+    return "1 finding" if count == 1 else f"{count:,} findings"

@@ -39,11 +39,12 @@ WHITE = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True)
 class LightOrigins:
-    """Where the lights of a scene are stored. objects: names of the light meshes. owner: (n,) int32, row in objects.
-    faces: (n,) int32, the face of the stored mesh that each light is (a part of), -1 where modifiers made it or the
-    light mesh is linked."""
+    """Where the lights of a scene are stored. objects: names of the light meshes, in the order of their lights and
+    vertices. vertex_counts: of each. owner: (n,) int32, row in objects. faces: (n,) int32, the face of the stored mesh
+    that each light is (a part of), -1 where modifiers made it or the light mesh is linked."""
 
     objects: tuple[str, ...]
+    vertex_counts: tuple[int, ...]
     owner: Int32
     faces: Int32
 
@@ -74,13 +75,16 @@ class _Read:
     faces: Int32
 
 
-def extract(options: ExtractOptions | None = None, depsgraph: Any = None) -> Extraction:
-    """`extract_scene` and `extract_light_mesh` from one evaluation; the snapshot's findings are those of both."""
+def extract(options: ExtractOptions | None = None, depsgraph: Any = None, broken_values: bool = False) -> Extraction:
+    """`extract_scene` and `extract_light_mesh` from one evaluation; the snapshot's findings are those of both.
+
+    broken_values: whether lights may have colours and strengths that no light can have, for the check to find.
+    """
     options = options or ExtractOptions()
     snapshot, lights, report = evaluate(
         lambda graph: _both(graph, options), options.viewport_levels, depsgraph, light_meshes=True
     )
-    light_mesh = _with_source_points(lights, snapshot, options, report)
+    light_mesh = _with_source_points(lights, snapshot, options, report, broken_values)
     findings = dict.fromkeys((*snapshot.findings, *report.findings))
     return Extraction(replace(snapshot, findings=tuple(findings)), light_mesh, _origins(lights) if lights else None)
 
@@ -113,16 +117,24 @@ def _both(depsgraph: Any, options: ExtractOptions) -> tuple[SceneSnapshot, list[
 def origins_of(thing: Any) -> LightOrigins:
     """The origins of the lights of one light mesh of triangles, as `write_light_mesh` has just stored it."""
     count = len(thing.data.polygons)
-    return LightOrigins((thing.name,), np.zeros(count, np.int32), np.arange(count, dtype=np.int32))
+    return LightOrigins(
+        (thing.name,), (len(thing.data.vertices),), np.zeros(count, np.int32), np.arange(count, dtype=np.int32)
+    )
 
 
 def _origins(found: list[_Read]) -> LightOrigins:
     owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(each.faces) for each in found])
-    return LightOrigins(tuple(each.name for each in found), owner, np.concatenate([each.faces for each in found]))
+    names = tuple(each.name for each in found)
+    vertices = tuple(len(each.lights.vertices) for each in found)
+    return LightOrigins(names, vertices, owner, np.concatenate([each.faces for each in found]))
 
 
 def _with_source_points(
-    lights: list[_Read], snapshot: SceneSnapshot, options: ExtractOptions, report: FindingList
+    lights: list[_Read],
+    snapshot: SceneSnapshot,
+    options: ExtractOptions,
+    report: FindingList,
+    broken_values: bool = False,
 ) -> VirtualLightMesh | None:
     if not lights:
         return None
@@ -132,7 +144,8 @@ def _with_source_points(
         problem = f"{missed} of {len(light_mesh)} lights have no visible surface in front of them"
         report("light mesh", problem, "the light on them is measured at the lights themselves")
     found = replace(light_mesh, samples=samples)
-    require_valid(found)
+    if not broken_values:
+        require_valid(found)
     return found
 
 

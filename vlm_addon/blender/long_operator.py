@@ -34,8 +34,11 @@ class LongOperator(Generic[T]):
         """The work, with all that it needs. Raises VlmError."""
         raise NotImplementedError
 
-    def finish(self, context: bpy.types.Context, result: T) -> None:
-        """Write `result` into Blender's data and report what was done. Raises VlmError."""
+    def finish(self, context: bpy.types.Context, result: T) -> Callable[[Progress], T] | None:
+        """Write `result` into Blender's data and report what was done; returns more work, or None when all is done.
+
+        What was written stays where later work is cancelled. Raises VlmError.
+        """
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -48,7 +51,9 @@ class LongOperator(Generic[T]):
             return True
 
         try:
-            self.finish(context, self.prepare(context)(progress))
+            work: Callable[[Progress], T] | None = self.prepare(context)
+            while work is not None:
+                work = self.finish(context, work(progress))
         except VlmError as error:
             return self._failed(error)
         finally:
@@ -77,11 +82,15 @@ class LongOperator(Generic[T]):
         if self._work.is_running:
             self._show_progress(context)
             return {"PASS_THROUGH"}
-        self._clean_up(context)
         try:
-            self.finish(context, self._work.result())
+            more = self.finish(context, self._work.result())
         except VlmError as error:
+            self._clean_up(context)
             return self._failed(error)
+        if more is not None:
+            self._work = BackgroundWork(more)
+            return {"RUNNING_MODAL"}
+        self._clean_up(context)
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:

@@ -139,6 +139,13 @@ def pair_thin(tagging: Tagging, progress: Progress) -> Retagged:
     return _paired(tagging, pairs, np.concatenate([np.zeros(0, bool), *needed]))
 
 
+def pair_lights(tagging: Tagging, chosen: Bool, progress: Progress) -> Retagged:
+    """The same for the lights of `chosen`, (n,) bool over all light meshes, alone."""
+    pairs = region_pairs(tagging.lights, tagging.source.snapshot.meshes, progress)
+    wanted = chosen[pairs.lights]
+    return _paired(tagging, replace(pairs, lights=pairs.lights[wanted], triangles=pairs.triangles[wanted]), None)
+
+
 def _paired(tagging: Tagging, pairs: RegionPairs, needed: Bool | None) -> Retagged:
     rows = tagging.rows_of_triangles()[pairs.triangles]
     kept = rows != NO_FACE

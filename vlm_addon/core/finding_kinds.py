@@ -17,3 +17,6 @@ TWO_SIDED = "two_sided"
 OVERLAPPING = "overlapping"
 BRIGHT = "bright"
 LOST_TAG = "lost_tag"
+
+BROKEN = frozenset({NOT_FINITE, NEGATIVE, BAD_SAMPLES})
+"""Kinds with which nothing else can be judged."""
