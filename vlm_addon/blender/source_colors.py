@@ -109,12 +109,13 @@ class SourceColors:
         """Reflectance and emission, (s, 3) each, of the part of its triangle of `shares` m² around each point."""
         areas = _areas(self._corners[triangles])
         scale = np.minimum(np.sqrt(shares / areas), 1.0)[:, None, None]
-        weights = _barycentrics(points, self._corners[triangles])[:, None, :]
+        # A triangle of the same shape around the point, cut off where it would reach beyond the one it is part of.
+        weights = _barycentrics(points, self._corners[triangles])[:, None, :] + scale * (np.eye(3) - 1.0 / 3.0)
+        weights = np.clip(weights, 0.0, None)
+        weights /= weights.sum(axis=2, keepdims=True)
 
         def around(values: Float32) -> Float32:
-            # A triangle of the same shape around the point: it never reaches beyond the one that it is part of.
-            rows = values[triangles].astype(np.float64)
-            return np.asarray(weights @ rows * (1.0 - scale) + scale * rows, np.float32)
+            return np.asarray(weights @ values[triangles].astype(np.float64), np.float32)
 
         indices = self._material_indices[triangles]
         return triangle_averages(self._materials, self._averager, indices, around(self._uvs), around(self._colors))
