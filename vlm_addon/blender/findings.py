@@ -10,7 +10,9 @@ import bpy
 import numpy as np
 import numpy.typing as npt
 
+from ..core import finding_kinds as kinds
 from ..core.errors import InvalidInput
+from ..core.repair import can_fix
 from ..core.scene import Finding
 from ..core.spans import numbers_in, parse_spans, spans_text
 from .light_faces import face_count, select_faces
@@ -20,6 +22,10 @@ from .light_meshes import light_meshes
 Int64 = npt.NDArray[np.int64]
 
 CHECK_AGAIN = "run Check again"
+TAGGED = (kinds.THIN, kinds.TWO_SIDED)
+"""Kinds whose fix is a tag: Blender's faces get them, not triangles."""
+MEANT = (kinds.BRIGHT,)
+"""Kinds that an artist may have wanted: only their own button mends them."""
 
 
 class VLM_PG_mark(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming of classes)
@@ -31,9 +37,10 @@ class VLM_PG_mark(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming of c
 
 
 class VLM_PG_finding(bpy.types.PropertyGroup):  # noqa: N801
-    """One sentence of the last check. kind: what `vlm.fix_findings` knows it by, "" where nothing is to be done."""
+    """One sentence of the last check. kind: what `vlm.fix_findings` knows it by; fixable: whether it can mend it."""
 
     text: bpy.props.StringProperty(name="Finding")  # type: ignore[valid-type]
+    fixable: bpy.props.BoolProperty(name="Can Be Fixed")  # type: ignore[valid-type]
     kind: bpy.props.StringProperty(name="Kind")  # type: ignore[valid-type]
     marks: bpy.props.CollectionProperty(type=VLM_PG_mark, name="Faces")  # type: ignore[valid-type]
 
@@ -46,12 +53,22 @@ def list_findings(scene: Any, findings: Sequence[Finding], origins: LightOrigins
     scene.vlm.findings.clear()
     for finding in findings:
         item = scene.vlm.findings.add()
-        item.text, item.kind = str(finding), finding.kind
+        item.text, item.kind, item.fixable = str(finding), finding.kind, fixable(finding.kind)
         faces = origins.faces_by_object(finding.lights) if origins is not None and finding.lights else {}
         for owner, rows in faces.items():
             mark = item.marks.add()
             mark.owner, mark.faces = owner, spans_text(rows)
             mark.face_count = len(scene.objects[owner].data.polygons)
+
+
+def fixable(kind: str) -> bool:
+    """Whether there is a fix for findings of this kind."""
+    return kind in TAGGED or can_fix(kind)
+
+
+def fixable_kinds(scene: Any) -> list[str]:
+    """Kinds of the kept findings that can be fixed, each once, but for those that an artist may have meant."""
+    return list(dict.fromkeys(item.kind for item in scene.vlm.findings if item.fixable and item.kind not in MEANT))
 
 
 def marked_faces(scene: Any, item: Any) -> dict[str, Int64]:

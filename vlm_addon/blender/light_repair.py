@@ -21,10 +21,11 @@ from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh
 from ..core.mesh_topology import Int64
 from ..core.progress import Progress
-from ..core.repair import Repair, can_fix, fix
+from ..core.repair import Repair, fix
 from ..core.scene import Float64
 from ..core.validate import check_light_mesh
 from .authoring import extract_edited, lights
+from .findings import TAGGED, fixable, fixable_kinds
 from .light_faces import face_count, read_faces, write_faces
 from .light_mesh_io import LightOrigins
 from .light_meshes import is_local, light_meshes
@@ -37,11 +38,6 @@ from .names import (
     TAG_ATTRIBUTE,
 )
 from .tag_pairing import Retagged, pair_lights, paired_text, read_tagging, write_retagged
-
-TAGGED = (kinds.THIN, kinds.TWO_SIDED)
-"""Kinds whose fix is a tag: Blender's faces get them, not triangles."""
-MEANT = (kinds.BRIGHT,)
-"""Kinds that an artist may have wanted: `all_kinds` leaves them out."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +55,6 @@ Fixed = Repaired | Retagged
 """What a step of fixing gives: a repair of lights, or new tags."""
 
 
-def fixable(kind: str) -> bool:
-    """Whether `vlm.fix_findings` can do something about findings of this kind."""
-    return kind in TAGGED or can_fix(kind)
-
-
 def kinds_to_fix(scene: Any, kind: str) -> list[str]:
     """The kind alone, or with "" all kinds of the kept findings that can be fixed but for those that may be meant.
 
@@ -73,11 +64,11 @@ def kinds_to_fix(scene: Any, kind: str) -> list[str]:
         if not fixable(kind):
             raise InvalidInput(f"finding {kind!r}", "there is no fix for it", "select its lights and mend them by hand")
         return [kind]
-    found = [item.kind for item in scene.vlm.findings if fixable(item.kind) and item.kind not in MEANT]
+    found = fixable_kinds(scene)
     if not found:
         problem = "none of them can be fixed by itself"
         raise InvalidInput("findings", problem, "run Check, and fix what may be meant by its own button")
-    return list(dict.fromkeys(found))
+    return found
 
 
 def work_on(context: Any, kind: str) -> Callable[[Progress], Fixed]:

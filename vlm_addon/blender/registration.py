@@ -15,6 +15,7 @@ from . import (
     draw_tool,
     engine,
     engine_panels,
+    menus,
     migration,
     panels,
     properties,
@@ -23,7 +24,7 @@ from . import (
 )
 from .render_process import KEPT
 
-PARTS = (migration, bake_state, draw_tool, setting_presets)
+PARTS = (migration, bake_state, draw_tool, setting_presets, menus)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()
@@ -39,7 +40,13 @@ def register(operator_classes: Iterable[type]) -> None:
         undo.callback(KEPT.close)
         undo.callback(_stop_timer)
         properties.register_scene_settings(undo)
-        for cls in (*operator_classes, *panels.CLASSES, *render_panels.CLASSES, engine.VLM_RenderEngine):
+        for cls in (
+            *operator_classes,
+            *panels.CLASSES,
+            *render_panels.CLASSES,
+            *panels.LAST_CLASSES,
+            engine.VLM_RenderEngine,
+        ):
             bpy.utils.register_class(cls)
             undo.callback(bpy.utils.unregister_class, cls)
         for part in PARTS:
