@@ -26,8 +26,8 @@ def tagged_regions(
     lights `rows` leave out these lights.
 
     Tags that there are stay: a light keeps its own, and where a face has another they are linked. light_of_triangle:
-    for each mesh, (its triangles,) int, -1 for none. face_of_triangle: likewise, the face that each triangle is part of,
-    every triangle by itself by default.
+    for each mesh, (its triangles,) int, -1 for none. face_of_triangle: likewise, the face that each triangle is part
+    of, every triangle by itself by default.
     """
     counts = [len(mesh.triangles) for mesh in meshes]
     lights, faces = _joined(light_of_triangle), _joined_faces(counts, face_of_triangle)

@@ -21,6 +21,8 @@ from .source_surface import SourceSurface
 
 # Lights before and after a dropped shell on the Z-order curve among which its triangles choose.
 ADOPTION_WINDOW = 8
+# A light that would shine on what it stands for counts as so many times as far, squared.
+SHONE_ON = 16.0
 # Some ten candidates each.
 ROWS_PER_BATCH = 1 << 16
 
@@ -91,6 +93,14 @@ class _Lights:
         return np.where(inside, 0.0, best) + height * height
 
 
+    def shine_on(self, points: Float64, normals: Float64, light: Int64) -> Bool:
+        """(n,) whether any of the light beside it reaches each point (n, 3) of a surface with that normal."""
+        offset = self.corners[light] - points[:, None]
+        in_front = np.einsum("ij,ij->i", self.normals[light], offset[:, 0]) < 0
+        over_horizon: Bool = np.einsum("ikj,ij->ik", offset, normals).max(axis=1) > 0
+        return in_front & over_horizon
+
+
 def _nearest_around(surface: SourceSurface, lights: _Lights, rows: Int64, merged: Int64, around: Rows) -> Int64:
     again = merged[:, 1] == merged[:, 0], (merged[:, 2] == merged[:, 0]) | (merged[:, 2] == merged[:, 1])
     kept = np.arange(len(rows)), np.flatnonzero(~again[0]), np.flatnonzero(~again[1])
@@ -136,7 +146,9 @@ def _adopt(surface: SourceSurface, lights: _Lights, source_triangle: Int64, rows
         flat = light.ravel()
         score = lights.squared_distances(centre[part][owner], flat)
         cosine = np.einsum("ij,ij->i", surface.normals[rows[part]][owner], lights.normals[flat])
-        score = score * (2.0 - cosine) + surface.diagonal**2 * (
+        shone_on = lights.shine_on(centre[part][owner], surface.normals[rows[part]][owner], flat)
+        score *= (2.0 - cosine) * np.where(shone_on, SHONE_ON, 1.0)
+        score += surface.diagonal**2 * (
             (surface.dynamic[rows[part]][owner] != surface.dynamic[source_triangle[flat]]).astype(float)
             + (surface.tag[rows[part]][owner] != surface.tag[source_triangle[flat]])
         )

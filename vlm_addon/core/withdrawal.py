@@ -106,18 +106,26 @@ def _best_places(
     flat = places.reshape(-1, 3, 3)
     repeated = _rows_of(regions, np.repeat(np.arange(count), each))
     own = own_shares(flat, repeated, source_corners, FINE_POINTS).reshape(count, each)
-    inside = _inside(flat, np.repeat(_spans(corners, regions, source_corners), each), tree).reshape(count, each)
-    # A light that is not inside as it stands may shrink there, too.
-    as_deep = np.arange(each) < len(SHRINKS) * (1 + len(DEPTHS))
-    as_deep &= np.arange(each) % (1 + len(DEPTHS)) == 0
-    inside |= ~inside[:, :1] & as_deep
-    # Of places inside those with little own light, of these the one with the least effort.
+    # Of places with little own light the one with the least effort.
     score = np.where(own <= ALLOWED, effort * ALLOWED, own + ALLOWED * (1.0 + effort))
-    score[~inside] = np.inf
-    best = score.argmin(axis=1)
-    row = np.arange(count)
-    left = np.where(inside[row, best], own[row, best], np.inf)
-    return places[row, best], left
+    span = _spans(corners, regions, source_corners)
+    # A light that is not inside as it stands may shrink there, too.
+    shallow = np.arange(each) < len(SHRINKS) * (1 + len(DEPTHS))
+    shallow &= np.arange(each) % (1 + len(DEPTHS)) == 0
+    free = np.flatnonzero(~_inside(corners, span, tree))
+    best, left = np.zeros(count, np.int64), np.full(count, np.inf)
+    order, open_rows = np.argsort(score, axis=1, kind="stable"), np.arange(count)
+    for attempt in range(each):
+        choice = order[open_rows, attempt]
+        allowed = shallow[choice] & np.isin(open_rows, free)
+        asked = np.flatnonzero(~allowed)
+        allowed[asked] = _inside(places[open_rows[asked], choice[asked]], span[open_rows[asked]], tree)
+        taken = open_rows[allowed]
+        best[taken], left[taken] = choice[allowed], own[taken, choice[allowed]]
+        open_rows = open_rows[~allowed]
+        if not len(open_rows):
+            break
+    return places[np.arange(count), best], left
 
 
 def _places(corners: Float64, inset: Float64, regions: Rows, source_corners: Float64) -> tuple[Float64, Float64]:
@@ -184,14 +192,14 @@ def _spans(corners: Float64, regions: Rows, source_corners: Float64) -> Float64:
 
 def _inside(corners: Float64, span: Float64, tree: TriangleTree) -> Bool:
     """(n,) whether all corners and the middle of each light look along its normal at the back of a surface."""
-    normal = _unit_normals(corners)
-    points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
-    way = np.broadcast_to((2.0 * span[:, None] * normal)[:, None], points.shape).reshape(-1, 3)
-    points = points.reshape(-1, 3)
-    met = tree.first_met(points, points + way)
-    facing = np.einsum("ij,ij->i", _unit_normals(tree.corners[met]), way) > 0
-    found: Bool = ((met >= 0) & facing).reshape(-1, 4).all(axis=1)
-    return found
+    way = span[:, None] * _unit_normals(corners)
+    inside = np.ones(len(corners), bool)
+    for points in (corners.mean(axis=1), *np.moveaxis(corners, 1, 0)):
+        rows = np.flatnonzero(inside)
+        met = tree.first_met(points[rows], points[rows] + way[rows])
+        facing = np.einsum("ij,ij->i", _unit_normals(tree.corners[met]), way[rows]) > 0
+        inside[rows] = (met >= 0) & facing
+    return inside
 
 
 def _rows_of(regions: Rows, chosen: Int64) -> Rows:
