@@ -69,7 +69,7 @@ def test_where_light_and_face_carry_different_ids_these_are_linked():
 
 
 def test_uses_of_one_id_are_related_over_others():
-    a, b, c, d = (TagUse(5, name) for name in "abcd")
+    a, b, c, d = (TagUse(5, ("lights", number)) for number in range(4))
     found = related([a, b, c, d], [(a, b), (c, b)])
     assert found[a] == found[b] == found[c] != found[d]
 

@@ -83,7 +83,7 @@ def read_source_faces() -> SourceFaces:
             (as_wholes if names[0] in wholes else read_only).add(names[0])
         rows.append(_deciding_rows(found, [wholes[name] for name in names if name in wholes], tags))
     meshes = tuple(
-        replace(mesh, tag_ids=np.where(each >= 0, tags[np.maximum(each, 0)], UNTAGGED).astype(np.int32))
+        replace(mesh, tag_ids=np.append(tags, np.int32(UNTAGGED))[each])  # NO_FACE is the last row
         for mesh, each in zip(numbered.meshes, rows, strict=True)
     )
     snapshot = replace(numbered, meshes=meshes)

@@ -182,7 +182,9 @@ def separate(tagging: Tagging, progress: Progress) -> Retagged:
     """
     pairs = region_pairs(tagging.lights, tagging.source.snapshot.meshes, progress)
     light_uses, face_uses, relations = _uses(tagging, pairs)
-    groups = related([*light_uses, *face_uses], relations)
+    # In order of light meshes: of copies, the first keeps its ids.
+    uses = [*sorted(light_uses, key=_order), *sorted(face_uses, key=_order)]
+    groups = related(uses, relations)
     lights, faces = sorted(light_uses, key=groups.__getitem__), sorted(face_uses, key=groups.__getitem__)
     found = separated_tags(
         [use.tag for use in lights],
@@ -206,6 +208,10 @@ def separate(tagging: Tagging, progress: Progress) -> Retagged:
     links = tuple(_renamed(each, new_light, number) for number, each in enumerate(tagging.links))
     changed = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
     return Retagged(tagging, *changed, links, len(found.repaired))
+
+
+def _order(use: TagUse) -> tuple[int, int]:
+    return use.owner[1], use.tag
 
 
 def _lights_owner(number: int) -> tuple[str, int]:

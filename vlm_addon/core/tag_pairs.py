@@ -7,7 +7,7 @@ section 3.4; tags.py). What carries a tag keeps it; what is missing is added wit
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,14 +80,14 @@ def unpaired(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32, l
 
 @dataclass(frozen=True)
 class TagUse:
-    """One object that carries a tag id: `owner` names it, whether by lights, faces or links."""
+    """One owner of lights or faces that carries a tag id, itself or by a link. owner: what it is, and its number."""
 
     tag: int
-    owner: Hashable
+    owner: tuple[str, int]
 
 
 def related(uses: Iterable[TagUse], pairs: Iterable[tuple[TagUse, TagUse]]) -> dict[TagUse, int]:
-    """A number for each use, the same for those of one id that `pairs` connect, directly or over others."""
+    """A number for each use, in their order, the same for those that `pairs` connect, directly or over others."""
     parent = {use: use for use in uses}
 
     def root(use: TagUse) -> TagUse:
