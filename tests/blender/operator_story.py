@@ -20,7 +20,7 @@ from survival_parameters import AFTER, OWN
 from survival_scene import build_start, load_extension
 from survival_state import content, difference
 
-BUDGET = 12
+BUDGET = 40
 SITUATIONS = {
     "light mesh selected": lambda lights, others: choose(lights),
     "light mesh edited": lambda lights, others: edit(lights[0], Random(1), everything=True),

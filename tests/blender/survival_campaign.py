@@ -128,19 +128,24 @@ class Sequence:
         orphans, materials, shared = unused(), _materials(), shared_tags()
         values = parameters(name, random)
         self.log.note(f"{name}({values})")
+        self.log.require_no_traceback()
         result = self._call(name, values)
+        said = self.log.require_no_traceback()
         self.results[f"{name} {result}"] += 1
         self.log.note(result)
-        if result != "FINISHED":
-            self._require_none(difference(before, content()), f"{name} that was refused")
+        if result != "FINISHED" or not _adds_undo_step(name):
+            self._require_none(difference(before, content()), f"{name}, {result} without an undo step")
             return
+        if not ("Info: " in said or "Warning: " in said):
+            raise Failure(f"vlm.{name} says nothing of what it did")
         self._remember()
         self._require_none(difference(linked(before), linked(self.history[self.place])), f"{name}, in linked data,")
         self._require_sound(name, orphans, materials, shared)
-        if self.history[self.place] != before and random.random() < UNDO_CHECK_SHARE:
+        changed = difference(before, self.history[self.place])
+        if changed and random.random() < UNDO_CHECK_SHARE:
             self._travel(-1, 1)
             self._travel(1, 1)
-        if mark_sources(self.marks):
+        if mark_sources(self.marks, changed):
             bpy.ops.ed.undo_push(message="stamped")
             self._remember()
 
@@ -176,6 +181,10 @@ class Sequence:
         grown = {tag: names for tag, names in shared_tags().items() if tag not in shared}
         if grown:
             raise Failure(f"vlm.{name} made unrelated light meshes share tags: {grown}")
+
+
+def _adds_undo_step(name):
+    return "UNDO" in bpy.types.Operator.bl_rna_get_subclass_py(f"VLM_OT_{name}").bl_options
 
 
 def _materials():

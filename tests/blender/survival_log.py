@@ -43,7 +43,8 @@ class Log:
         return text
 
     def require_no_traceback(self):
-        """Raises Failure where a handler printed a traceback since the last look."""
+        """What was printed since the last look. Raises Failure where a handler printed a traceback."""
         text = self.since()
         if "Traceback" in text:
             raise Failure(text[text.index("Traceback") :][-1500:])
+        return text

@@ -22,7 +22,11 @@ def _finding(random):
     return {"index": random.choice(named or [0])}
 
 
-OWN = {"select_offenders": _finding, **STROKES}
+OWN = {
+    "add_preset": lambda random: {"name": f"preset {random.randint(1, 3)}"},
+    "select_offenders": _finding,
+    **STROKES,
+}
 """Parameters of single operators, by name: functions of the random numbers."""
 
 AFTER = {
@@ -34,7 +38,7 @@ AFTER = {
 }
 """Operators that need what another one makes."""
 
-NOT_ALONE = {"open_documentation": "opens a browser"}
+NOT_ALONE = {"open_documentation": "opens a browser", "draw_key": "works while a light is being drawn"}
 """Operators that the campaign leaves out, with the reason."""
 
 

@@ -166,26 +166,32 @@ def marks_of(thing):
     return [mark for mark in str(thing.get(SOURCES, "")).split("\n") if mark]
 
 
-def mark_sources(numbers):
-    """Mark the sources of light meshes that are new or were made anew, with `numbers`; returns how many were."""
+def mark_sources(numbers, changed):
+    """Mark the sources of light meshes that are new or made anew, with `numbers`; returns how many were.
+
+    changed: keys of the content that the last step changed. Made anew is what has other sources by name, or other
+    ones by id and another mesh: ids alone change where copies are told apart.
+    """
     marked = 0
     for scene in bpy.data.scenes:
         for thing in scene.objects:
             if is_light_mesh(thing) and "vlm_sources" in thing and not thing.library and not thing.override_library:
-                marked += _mark(thing, scene, numbers)
+                marked += _mark(thing, scene, numbers, changed)
     return marked
 
 
-def _mark(thing, scene, numbers):
-    said = f"{thing['vlm_sources']} {list(thing.get('vlm_source_ids', ()))}"
-    if thing.get(STAMPED) == said:
+def _mark(thing, scene, numbers, changed):
+    names, ids = thing["vlm_sources"], str(list(thing.get("vlm_source_ids", ())))
+    known_names, _, known_ids = str(thing.get(STAMPED, "")).rpartition("\n")
+    same_mesh = not any(key.startswith(f"mesh {_name(thing.data)} ") for key in changed)
+    if STAMPED in thing and known_names == names and (known_ids == ids or same_mesh):
         return False
     objects = [scene.objects.get(name) for name in thing["vlm_sources"].split("\n")]
     marks = [NO_MARK if each is None or each.library else f"{MARK} {next(numbers)}" for each in objects]
     for mark, each in zip(marks, objects, strict=True):
         if mark != NO_MARK:
             each[mark] = True
-    thing[SOURCES], thing[STAMPED] = "\n".join(marks), said
+    thing[SOURCES], thing[STAMPED] = "\n".join(marks), f"{names}\n{ids}"
     thing[ORIGINS] = "\n".join(NO_MARK if each is None else str(each.get(ORIGIN, NO_MARK)) for each in objects)
     return True
 
