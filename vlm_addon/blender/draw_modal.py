@@ -89,13 +89,11 @@ class ModalStroke:
         self._vertices = vertices_world(active) if own else np.zeros((0, 3))
         self._preview = Preview()
         self._handle = draw_preview.show(self._preview)
+        if self.modal(context, event) == CANCELLED:
+            return CANCELLED
+        # Only now: Blender would keep a handler of a stroke that has ended.
         context.window_manager.modal_handler_add(self)
-        with ExitStack() as undo:
-            undo.callback(self._clean_up, context)
-            result = self._handled(context, event)
-            if result & {"RUNNING_MODAL", "PASS_THROUGH"}:
-                undo.pop_all()
-        return RUNNING if result == {"PASS_THROUGH"} else result
+        return RUNNING
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """One event; whatever ends the stroke takes its lines and texts away."""

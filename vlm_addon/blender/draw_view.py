@@ -71,10 +71,6 @@ def view_under(area: Any, x: int, y: int) -> tuple[View, Float64] | None:
     x, y: in the window. With a quad view each of the four regions is one.
     """
     for region in area.regions:
-        inside = 0 <= x - region.x < region.width and 0 <= y - region.y < region.height
-        if region.type != "WINDOW" and inside and region.alignment != "NONE":
-            return None
-    for region in area.regions:
         if region.type == "WINDOW" and 0 <= x - region.x < region.width and 0 <= y - region.y < region.height:
             data = region.data or area.spaces.active.region_3d
             view = View(
