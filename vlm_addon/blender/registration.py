@@ -21,10 +21,11 @@ from . import (
     properties,
     render_panels,
     setting_presets,
+    translation,
 )
 from .render_process import KEPT
 
-PARTS = (migration, bake_state, draw_tool, setting_presets, menus)
+PARTS = (migration, bake_state, draw_tool, setting_presets, menus, translation)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()

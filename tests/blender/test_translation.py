@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every operator and panel has a German name, and Blender shows it."""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import bpy
+import pytest
+
+from vlm_addon.blender import german, panels, render_panels, translation
+from vlm_addon.blender.properties import ensure_scene_settings
+
+OPERATORS = Path(__file__).resolve().parents[2] / "operators"
+
+
+def operator_ids():
+    """Of every operator: each has a file of its name."""
+    return {f"vlm.{path.stem}" for path in OPERATORS.glob("*.py")} - {"vlm.__init__"}
+
+
+@pytest.fixture
+def german_blender(_empty_file):
+    """Blender in German, with one operator of ours, after `translation.register`."""
+    bake = {"bl_idname": "vlm.bake", "bl_label": "Bake", "__doc__": "Make lights"}
+    operator = type("VLM_OT_bake", (bpy.types.Operator,), bake)
+    view = bpy.context.preferences.view
+    before = view.language, view.use_translate_interface, view.use_translate_tooltips
+    with ExitStack() as undo:
+        bpy.utils.register_class(operator)
+        undo.callback(bpy.utils.unregister_class, operator)
+        translation.register(undo)
+        try:
+            view.language = "de_DE"
+        except TypeError:
+            pytest.skip("this Blender was built without languages")
+        view.use_translate_interface = view.use_translate_tooltips = True
+        yield undo
+    view.language, view.use_translate_interface, view.use_translate_tooltips = before
+
+
+def test_every_operator_has_a_german_label_and_tooltip():
+    assert operator_ids() == set(german.OPERATORS)
+    assert all(label and tooltip for label, tooltip in german.OPERATORS.values())
+
+
+def test_every_panel_has_a_german_title():
+    titles = {panel.bl_label for panel in (*panels.CLASSES, *render_panels.CLASSES)}
+    assert sorted(titles - set(german.LABELS)) == []
+
+
+def test_the_settings_that_the_panels_show_first_have_german_names(scene):
+    ensure_scene_settings()
+    shown = scene.vlm.bl_rna.properties, scene.vlm.vlm_settings.bl_rna.properties
+    names = {prop.name for group in shown for prop in group if prop.type != "POINTER" and prop.identifier != "name"}
+    names |= {prop.name for prop in scene.vlm.effects.bl_rna.properties if prop.type == "ENUM"} - {"Combine"}
+    assert sorted(names - set(german.PROPERTIES | german.LABELS)) == []
+
+
+def test_blender_shows_them(german_blender):
+    tell = bpy.app.translations.pgettext_iface
+    assert tell("Bake", "Operator") == german.OPERATORS["vlm.bake"][0]
+    assert bpy.app.translations.pgettext_tip("Make lights") == german.OPERATORS["vlm.bake"][1]
+    assert tell("Target Triangles") == german.PROPERTIES["Target Triangles"]
+
+
+def test_afterwards_blender_shows_english_again(german_blender):
+    german_blender.close()
+    assert bpy.app.translations.pgettext_iface("Target Triangles") == "Target Triangles"
+
+
+def test_an_operator_that_is_not_there_stops_nothing():
+    texts = translation.messages()["de_DE"]
+    assert ("Operator", "Light Scene") not in texts
+    assert texts["*", "Target Triangles"] == german.PROPERTIES["Target Triangles"]

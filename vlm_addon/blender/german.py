@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The German texts of the interface."""
+
+OPERATORS = {
+    "vlm.add_preset": (
+        "Vorgabe für Lichtnetze hinzufügen",
+        "Das Verfahren mit seinen Einstellungen, die Effekte und die Größe der Lichtnetze unter einem Namen aufheben",
+    ),
+    "vlm.assign_tag": (
+        "Kennung zuweisen",
+        "Den gewählten Lichtnetzen und Objekten oder im Bearbeitungsmodus den gewählten Flächen eine Kennung "
+        "geben: Flächen lassen die Lichter ihrer eigenen Kennung aus",
+    ),
+    "vlm.bake": (
+        "Backen",
+        "Virtuelle Lichter für die sichtbare Szene machen, wo sie keine hat, und sie prüfen",
+    ),
+    "vlm.bake_grid": (
+        "Lichtgitter backen",
+        "Backen, welche Lichter welchen Ort beleuchten, für Engines und die Kommandozeile, in einen Ordner "
+        "neben der .blend-Datei",
+    ),
+    "vlm.check": (
+        "Prüfen",
+        "Suchen, was an den virtuellen Lichtnetzen falsch ist; die Befunde stehen in der Seitenleiste",
+    ),
+    "vlm.check_bake": (
+        "Mit Gebackenem vergleichen",
+        "Die Szene mit dem vergleichen, woraus ihre Lichtnetze und ihr Lichtgitter gemacht sind; liest alle "
+        "sichtbare Geometrie",
+    ),
+    "vlm.clear_bake": (
+        "Gebackenes löschen",
+        "Das gebackene Lichtgitter der Szene von der Platte löschen; Lichtnetze bleiben. Nicht rückgängig zu "
+        "machen: neu backen",
+    ),
+    "vlm.clear_tag": (
+        "Kennung entfernen",
+        "Die Kennungen der gewählten Lichtnetze und Objekte oder im Bearbeitungsmodus der gewählten Flächen entfernen",
+    ),
+    "vlm.copy_diagnostics": (
+        "Diagnose kopieren",
+        "Versionen, Gerät, Einstellungen und die letzten Zeilen im Protokoll des Renderers kopieren, ohne "
+        "Namen von Dateien und Objekten",
+    ),
+    "vlm.create_from_collection": (
+        "Aus Sammlung erstellen",
+        "Virtuelle Lichter machen, die für das Streulicht der Objekte einer Sammlung stehen",
+    ),
+    "vlm.create_from_scene": (
+        "Aus Szene erstellen",
+        "Virtuelle Lichter machen, die für das Streulicht von allem stehen, was die Szene zeigt, in einem Lichtnetz",
+    ),
+    "vlm.create_from_selection": (
+        "Aus Auswahl erstellen",
+        "Virtuelle Lichter machen, die für das Streulicht der gewählten Objekte stehen",
+    ),
+    "vlm.draw_cut": (
+        "Lichter schneiden",
+        "Punkte quer über Lichter der gewählten Lichtnetze klicken: Sie werden entlang des Weges geteilt",
+    ),
+    "vlm.draw_erase": (
+        "Lichter radieren",
+        "Über Lichter der gewählten Lichtnetze ziehen, um sie zu löschen; gesperrte bleiben",
+    ),
+    "vlm.draw_extrude": (
+        "Lichter entlangziehen",
+        "Eine Kante eines Lichts entlang einer Fläche ziehen: Ein Streifen von Lichtern folgt",
+    ),
+    "vlm.draw_fill": (
+        "Lichter aus gewählten Flächen",
+        "Die gewählten Flächen des sichtbaren Netzes als Lichter dahinter kopieren, mit Farbe und Kennung der Fläche",
+    ),
+    "vlm.draw_key": (
+        "Zeichentaste",
+        "Was eine Taste tut, während mit einem Zeichenwerkzeug gezeichnet wird",
+    ),
+    "vlm.draw_polygon": (
+        "Licht als Polygon zeichnen",
+        "Die Ecken eines Lichts auf einer Fläche klicken oder umfahren. Es übernimmt Farbe und Kennung der Fläche",
+    ),
+    "vlm.draw_rectangle": (
+        "Licht als Rechteck zeichnen",
+        "Ein Rechteck auf eine Fläche ziehen, ein Licht oder ein Gitter davon. Sie übernehmen Farbe und "
+        "Kennung der Fläche",
+    ),
+    "vlm.fill_color": (
+        "Farbe füllen",
+        "Den gewählten Lichtern eine Farbe geben; was sichtbar ist, bleibt, wie es ist",
+    ),
+    "vlm.fix_findings": (
+        "Beheben",
+        "Beheben, was die letzte Prüfung gefunden hat: Lichter hinter ihre Fläche rücken, umdrehen, dünne "
+        "Körper kennzeichnen. Dauert für jede Art so lange wie eine Prüfung",
+    ),
+    "vlm.follow_source": (
+        "Quelle folgen",
+        "Die gewählten Lichtnetze ihren Quellen oder den anderen gewählten Objekten unterordnen, mit deren Rig",
+    ),
+    "vlm.gradient_color": (
+        "Farbverlauf",
+        "Die Farbe der gewählten Lichter von einer zur anderen laufen lassen, entlang einer Richtung oder "
+        "zwischen zwei Punkten",
+    ),
+    "vlm.light_scene": (
+        "Szene beleuchten",
+        "Virtuelle Lichter für die sichtbare Szene machen, vorhandene Lichtnetze behalten und sie damit "
+        "beleuchtet rendern",
+    ),
+    "vlm.link_receiver": (
+        "Objekte auslassen",
+        "Das Streulicht der gewählten Lichter von den gewählten sichtbaren Objekten fernhalten; direktes "
+        "Licht und Schatten bleiben",
+    ),
+    "vlm.lock_lights": (
+        "Lichter sperren",
+        "Die gewählten Lichter behalten, wie sie sind, wenn das Lichtnetz neu erstellt oder neu gefärbt wird",
+    ),
+    "vlm.multiply_color": (
+        "Farbe multiplizieren",
+        "Die Farben der gewählten Lichter Kanal für Kanal multiplizieren",
+    ),
+    "vlm.open_documentation": (
+        "Handbuch",
+        "Das Handbuch öffnen, das mit der Erweiterung kommt; es braucht kein Netz",
+    ),
+    "vlm.paint_detail": (
+        "Detail malen",
+        "Auf das sichtbare Netz malen, wo das nächste Lichtnetz mehr Lichter bekommt oder gar keine",
+    ),
+    "vlm.pair_tags": (
+        "Kennungen paaren",
+        "Jede Fläche die Lichter auslassen lassen, die für sie stehen, durch Kennungen und Verknüpfungen "
+        "neben den vorhandenen; für die gewählten Lichtnetze, auf den gewählten Objekten oder sonst auf "
+        "allem, woraus sie gemacht sind. Sekunden für 5.000 Lichter",
+    ),
+    "vlm.pick_color": (
+        "Farbe aufnehmen",
+        "Auf eine sichtbare Fläche klicken: Die gewählten Lichter nehmen ihre diffuse Farbe an, gemittelt "
+        "über eine Fläche ihrer Größe",
+    ),
+    "vlm.recolor_from_materials": (
+        "Farben aus Materialien",
+        "Den gewählten Lichtern die mittlere Farbe der sichtbaren Fläche geben, für die jedes steht; einige "
+        "Sekunden für 5.000",
+    ),
+    "vlm.repair_tags": (
+        "Kennungen reparieren",
+        "Kopien von Lichtnetzen und Objekten eigene Kennungen geben, wo sie welche mit Fremdem teilen; "
+        "Objekte, die eine Kennung ohne eigenes Licht teilen, verlieren sie",
+    ),
+    "vlm.select_offenders": (
+        "Betroffene auswählen",
+        "Die Lichtnetze bearbeiten, die dieser Befund der letzten Prüfung nennt; nur seine Flächen sind gewählt",
+    ),
+    "vlm.set_strength": (
+        "Stärke setzen",
+        "Faktoren auf alle Lichter der gewählten Lichtnetze; die Farben ihrer Flächen bleiben, wie sie sind",
+    ),
+    "vlm.shift_hue": (
+        "Farbton verschieben",
+        "Den Farbton der gewählten Lichter drehen; jedes sendet so viel Licht aus wie zuvor",
+    ),
+    "vlm.show_licences": (
+        "Lizenzen",
+        "Die Lizenzen der Erweiterung und der mitgelieferten Software auflisten",
+    ),
+    "vlm.stop_following": (
+        "Nicht mehr folgen",
+        "Die gewählten Lichtnetze von dem lösen, dem sie folgen; Form und Ort dieses Bildes bleiben",
+    ),
+    "vlm.tag_thin": (
+        "Dünne Flächen kennzeichnen",
+        "Dünne Körper und von beiden Seiten sichtbare Flächen finden und ihre Seiten die Lichter auslassen "
+        "lassen, die für sie stehen; vorhandene Kennungen bleiben",
+    ),
+    "vlm.unlink_receiver": (
+        "Objekte wieder beleuchten",
+        "Die gewählten Lichter die gewählten sichtbaren Objekte wieder beleuchten lassen, oder alle, wenn "
+        "keines gewählt ist",
+    ),
+    "vlm.unlock_lights": (
+        "Lichter entsperren",
+        "Die gewählten Lichter sich wieder ändern lassen, wenn das Lichtnetz neu erstellt oder neu gefärbt wird",
+    ),
+}
+"""Label and tooltip of each operator."""
+
+BUTTONS = {
+    "Render Image": "Bild rendern",
+    "Select": "Auswählen",
+}
+"""Texts of buttons that differ from their operator's label, by the English ones."""
+
+LABELS = {
+    "Animate": "Animieren",
+    "Bake": "Backen",
+    "By": "Durch",
+    "Check": "Prüfen",
+    "Color": "Farbe",
+    "Create": "Erstellen",
+    "Detail": "Detail",
+    "Draw": "Zeichnen",
+    "Effects": "Effekte",
+    "Hue": "Farbton",
+    "No light mesh yet": "Noch kein Lichtnetz",
+    "Overlays": "Überlagerungen",
+    "Presets": "Vorgaben",
+    "Render": "Rendern",
+    "Strength": "Stärke",
+    "Support": "Hilfe",
+    "Tags": "Kennungen",
+    "View": "Ansicht",
+}
+"""Titles of panels and texts in them, by the English ones."""
+
+PROPERTIES = {
+    "Ambient occlusion": "Umgebungsverdeckung",
+    "Direct light": "Direktes Licht",
+    "Exact Reach": "Genaue Reichweite",
+    "Filter": "Filter",
+    "Filter Cosine": "Filterkosinus",
+    "Filter Distance": "Filterabstand",
+    "Findings of the last check": "Befunde der letzten Prüfung",
+    "Grid": "Gitter",
+    "Highlights": "Glanzlichter",
+    "Indirect light": "Indirektes Licht",
+    "Layered materials": "Geschichtete Materialien",
+    "Light Budget": "Lichtbudget",
+    "Light mesh reflection": "Spiegelung des Lichtnetzes",
+    "Lights": "Lichter",
+    "Map reflection": "Spiegelung aus Karten",
+    "Max Lights": "Höchstzahl der Lichter",
+    "Octree Resolution": "Auflösung des Octrees",
+    "Range": "Reichweite",
+    "Samples": "Abtastungen",
+    "Screen reflection": "Spiegelung aus dem Bild",
+    "Shadows": "Schatten",
+    "Target Triangles": "Anzahl der Lichter",
+    "Technique": "Verfahren",
+    "Temporal accumulation": "Zeitliche Mittelung",
+    "Tolerance": "Toleranz",
+    "Visibility": "Sichtbarkeit",
+    "Visibility Cells": "Sichtbarkeitszellen",
+    "Visibility Points": "Sichtbarkeitspunkte",
+    "Visibility Rays": "Sichtbarkeitsstrahlen",
+    "Visibility of lights": "Sichtbarkeit der Lichter",
+    "World Lights": "Lichter der Welt",
+    "World lights": "Lichter der Welt",
+}
+"""Names of settings that the scene keeps, by the English ones."""
