@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, tag_pairing
+from ..vlm_addon.blender import authoring, availability, tag_pairing, tag_separation
 from ..vlm_addon.blender.long_operator import LongOperator
 
 
@@ -20,7 +20,7 @@ objects that share an id without any light of theirs lose it"""
         return authoring.allow(cls, availability.light_scene_tags_problem(context))
 
     def prepare(self, context):
-        return tag_pairing.scene_work(context, tag_pairing.separate)
+        return tag_pairing.scene_work(context, tag_separation.separate)
 
     def finish(self, context, result):
-        self.report({"INFO"}, tag_pairing.repaired_text(result, tag_pairing.write_retagged(context, result)))
+        self.report({"INFO"}, tag_separation.repaired_text(result, tag_pairing.write_retagged(context, result)))

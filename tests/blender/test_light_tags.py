@@ -11,6 +11,7 @@ from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.light_tags import assign_tag, clear_tag, tag_problem, unused_tag
 from vlm_addon.blender.source_faces import NO_FACE, read_source_faces
 from vlm_addon.blender.stored_links import read_links, write_links
+from vlm_addon.blender.tag_separation import separate
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out
 from vlm_addon.core.progress import silent
@@ -311,7 +312,7 @@ def test_copies_get_ids_of_their_own_with_their_links(make_grid, make_lights, sc
         scene.collection.objects.link(copy)
         copies.append(copy)
     copies[1]["vlm_sources"] = ""
-    made, written = run(tag_pairing.separate, lights, copies[1])
+    made, written = run(separate, lights, copies[1])
     assert made.pairs > 0
     assert (tags(grid), tags(lights), read_links(lights).tolist()) == originals
     assert not set(tags(copies[1])) & set(originals[1])
@@ -321,7 +322,7 @@ def test_copies_get_ids_of_their_own_with_their_links(make_grid, make_lights, sc
     of_copy = np.array([mesh.positions[:, 0].mean() > 5 for mesh in extract().snapshot.meshes]).repeat(2)
     lights_of_copy = extract().light_mesh.corners[:, :, 0].mean(axis=1) > 5
     assert np.array_equal(out, lights_of_copy[:, None] == of_copy[None])
-    assert run(tag_pairing.separate, lights, copies[1])[0].pairs == 0
+    assert run(separate, lights, copies[1])[0].pairs == 0
 
 
 def test_what_changed_meanwhile_is_left_alone(make_grid, make_lights):

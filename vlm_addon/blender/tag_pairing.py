@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tags found by place: each light with the faces that it stands for, so that these leave it out.
 
-In three steps: Blender's data are read (`read_tagging`), pairs are found without it (`pair`, `pair_thin`,
-`separate`), and what changes is written (`write_retagged`).
+In three steps: Blender's data are read (`read_tagging`), pairs are found without it (`pair`, `pair_thin`;
+tag_separation.py: `separate`), and what changes is written (`write_retagged`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ from ..core.light_links import make_links, no_links
 from ..core.light_mesh import VirtualLightMesh, empty_light_mesh
 from ..core.mesh_topology import Bool
 from ..core.progress import Progress
-from ..core.scene import UNTAGGED, Int32
-from ..core.tag_pairs import TagUse, add_tags, related, unpaired
-from ..core.tags import separated_tags
+from ..core.scene import Int32
+from ..core.tag_pairs import add_tags, unpaired
 from ..core.thin_surface import thin_triangles
 from .availability import has_geometry
 from .light_colors import one_per_mesh
@@ -175,91 +174,6 @@ def _as_light_mesh(lights: Sequence[SourceLights]) -> VirtualLightMesh:
     return replace(empty_light_mesh(), vertices=corners.reshape(-1, 3), triangles=triangles)
 
 
-def separate(tagging: Tagging, progress: Progress) -> Retagged:
-    """Ids that light meshes or objects share which have nothing to do with each other are taken apart.
-
-    Light mesh and object are related by an id where a light of it stands for a face that leaves it out.
-    """
-    pairs = region_pairs(tagging.lights, tagging.source.snapshot.meshes, progress)
-    light_uses, face_uses, relations = _uses(tagging, pairs)
-    # In order of light meshes: of copies, the first keeps its ids.
-    uses = [*sorted(light_uses, key=_order), *sorted(face_uses, key=_order)]
-    groups = related(uses, relations)
-    lights, faces = sorted(light_uses, key=groups.__getitem__), sorted(face_uses, key=groups.__getitem__)
-    found = separated_tags(
-        [use.tag for use in lights],
-        [groups[use] for use in lights],
-        [use.tag for use in faces],
-        [groups[use] for use in faces],
-        tagging.unused,
-    )
-    new_light = dict(zip(lights, found.light_tags.tolist(), strict=True))
-    new_face = dict(zip(faces, found.face_tags.tolist(), strict=True))
-    light_mesh_of = tagging.light_mesh_of()
-    light_tags = [
-        new_light.get(TagUse(tag, _lights_owner(owner)), tag)
-        for tag, owner in zip(tagging.light_tags.tolist(), light_mesh_of.tolist(), strict=True)
-    ]
-    place_of = tagging.source.place_of(np.arange(len(tagging.source.tags)))
-    face_tags = [
-        new_face.get(TagUse(tag, _place_owner(place)), tag)
-        for tag, place in zip(tagging.source.tags.tolist(), place_of.tolist(), strict=True)
-    ]
-    links = tuple(_renamed(each, new_light, number) for number, each in enumerate(tagging.links))
-    changed = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
-    return Retagged(tagging, *changed, links, len(found.repaired))
-
-
-def _order(use: TagUse) -> tuple[int, int]:
-    return use.owner[1], use.tag
-
-
-def _lights_owner(number: int) -> tuple[str, int]:
-    return "lights", number
-
-
-def _place_owner(number: int) -> tuple[str, int]:
-    return "place", number
-
-
-def _uses(tagging: Tagging, pairs: RegionPairs) -> tuple[set[TagUse], set[TagUse], list[tuple[TagUse, TagUse]]]:
-    """Uses of ids by lights and by faces, and which of them belong together.
-
-    A linked pair is one of both ids: the lights carry the id of the faces, too, and the other way round.
-    """
-    light_mesh_of, tags = tagging.light_mesh_of(), tagging.source.tags
-    rows = tagging.rows_of_triangles()[pairs.triangles]
-    known = rows != NO_FACE
-    lights, faces = pairs.lights[known], rows[known].astype(np.int64)
-    out = ~unpaired(lights, faces, tagging.light_tags, tags, tagging.all_links)
-    lights, faces = lights[out], faces[out]
-    places = tagging.source.place_of(faces)
-    joined = np.stack([tagging.light_tags[lights], light_mesh_of[lights], tags[faces], places], axis=1)
-    light_uses = _all_uses(tagging.light_tags, light_mesh_of, _lights_owner)
-    places_of_all = tagging.source.place_of(np.arange(len(tags)))
-    face_uses = _all_uses(tags, places_of_all, _place_owner)
-    relations = []
-    for light_tag, light_mesh, face_tag, place in np.unique(joined, axis=0).tolist():
-        for tag in {light_tag, face_tag}:
-            of_lights, of_faces = TagUse(tag, _lights_owner(light_mesh)), TagUse(tag, _place_owner(place))
-            light_uses.add(of_lights)
-            face_uses.add(of_faces)
-            relations.append((of_lights, of_faces))
-    return light_uses, face_uses, relations
-
-
-def _all_uses(tags: np.ndarray, owners: np.ndarray, name: Any) -> set[TagUse]:
-    found = np.unique(np.stack([tags, owners], axis=1)[tags != UNTAGGED], axis=0)
-    return {TagUse(tag, name(owner)) for tag, owner in found.tolist()}
-
-
-def _renamed(links: Int32, new_light: dict[TagUse, int], number: int) -> Int32:
-    """Links of one light mesh with the ids that its lights, and what they are linked to, have now."""
-    owner = _lights_owner(number)
-    pairs = [[new_light.get(TagUse(tag, owner), tag) for tag in link] for link in links.tolist()]
-    return make_links(np.array([each for each in pairs if UNTAGGED not in each], np.int64).reshape(-1, 2))
-
-
 @dataclass(frozen=True)
 class Written:
     """How many lights, faces and objects as a whole got another tag, and how many links there are more."""
@@ -335,12 +249,3 @@ def paired_text(made: Retagged, written: Written) -> str:
         if names:
             told += f"; {names[0]!r}{f' and {len(names) - 1} more' if len(names) > 1 else ''} {why}"
     return told
-
-
-def repaired_text(made: Retagged, written: Written) -> str:
-    """A sentence with counts."""
-    if not made.pairs:
-        return "No tag id is shared by what does not belong together"
-    parts = [counted(written.lights, "light"), counted(written.faces, "face"), counted(written.objects, "whole object")]
-    changed = ", ".join(part for part in parts if part) or "nothing"
-    return f"{counted(made.pairs, 'tag id')} shared: {changed} changed"
