@@ -3,7 +3,7 @@
 
 OPERATORS = {
     "vlm.add_preset": (
-        "Vorgabe für Lichtnetze hinzufügen",
+        "Voreinstellung für Lichtnetze hinzufügen",
         "Das Verfahren mit seinen Einstellungen, die Effekte und die Größe der Lichtnetze unter einem Namen aufheben",
     ),
     "vlm.assign_tag": (
@@ -45,15 +45,15 @@ OPERATORS = {
     ),
     "vlm.create_from_collection": (
         "Aus Sammlung erstellen",
-        "Virtuelle Lichter machen, die für das Streulicht der Objekte einer Sammlung stehen",
+        "Virtuelle Lichter machen, die für das reflektierte Licht der Objekte einer Sammlung stehen",
     ),
     "vlm.create_from_scene": (
         "Aus Szene erstellen",
-        "Virtuelle Lichter machen, die für das Streulicht von allem stehen, was die Szene zeigt, in einem Lichtnetz",
+        "Virtuelle Lichter machen, die für das reflektierte Licht von allem stehen, was die Szene zeigt, in einem Lichtnetz",
     ),
     "vlm.create_from_selection": (
         "Aus Auswahl erstellen",
-        "Virtuelle Lichter machen, die für das Streulicht der gewählten Objekte stehen",
+        "Virtuelle Lichter machen, die für das reflektierte Licht der gewählten Objekte stehen",
     ),
     "vlm.draw_cut": (
         "Lichter schneiden",
@@ -121,7 +121,7 @@ OPERATORS = {
         "Die Farben der gewählten Lichter Kanal für Kanal multiplizieren",
     ),
     "vlm.open_documentation": (
-        "Handbuch",
+        "Dokumentation",
         "Das Handbuch öffnen, das mit der Erweiterung kommt; es braucht kein Netz",
     ),
     "vlm.paint_detail": (
@@ -205,7 +205,7 @@ LABELS = {
     "Hue": "Farbton",
     "No light mesh yet": "Noch kein Lichtnetz",
     "Overlays": "Überlagerungen",
-    "Presets": "Vorgaben",
+    "Presets": "Voreinstellungen",
     "Render": "Rendern",
     "Strength": "Stärke",
     "Support": "Hilfe",
@@ -233,7 +233,7 @@ PROPERTIES = {
     "Max Lights": "Höchstzahl der Lichter",
     "Octree Resolution": "Auflösung des Octrees",
     "Range": "Reichweite",
-    "Samples": "Abtastungen",
+    "Samples": "Abtastwerte",
     "Screen reflection": "Spiegelung aus dem Bild",
     "Shadows": "Schatten",
     "Target Triangles": "Anzahl der Lichter",
