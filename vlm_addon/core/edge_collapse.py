@@ -21,26 +21,29 @@ from .scene import Float64
 
 FREE, LINE, CORNER = 0, 1, 2
 # Share of the edges, cheapest first, that one pass may touch.
-BATCH_SHARE = 0.25
-MINIMUM_BATCH = 64
+BATCH_SHARE = 0.1
+MINIMUM_BATCH = 16
+# Where every edge is looked at because none of the cheapest may go, so many of those that may.
+FEWEST_OF_ALL = 2
+# What a collapse that makes a poor shape must be cheaper by to go before one that makes none: without such a price
+# the last sound collapses would take half of a wall before a small body gets an ugly triangle.
+POOR_SHAPE_PRICE = 10.0
 SELECTION_ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Rules:
+class Shapes:
     """What a collapse may do to the triangles around it.
 
     minimum_turn_cosine: between a triangle's normal after and both before and at the very start. minimum_quality: of
-    a triangle that becomes worse, 1 for equilateral. keep_features: whether group borders keep their line.
+    a triangle that becomes worse, 1 for equilateral.
     """
 
     minimum_turn_cosine: float
     minimum_quality: float
-    keep_features: bool
 
 
-# Tried in turn, each only when the one before has no collapse left and the target is not reached.
-RULES = (Rules(0.2, 0.05, True), Rules(0.0, 0.001, True), Rules(0.0, 0.001, False))
+GOOD, POOR = Shapes(0.2, 0.05), Shapes(0.0, 0.001)
 
 
 @dataclass(frozen=True)
@@ -99,17 +102,18 @@ def collapse_edges(
     called with the share of the work that is done, may raise.
     """
     state = _initial_state(positions, triangles, group, weight, normals)
-    level = 0
-    while len(state.triangles) > target and level < len(RULES):
-        rules = RULES[level]
+    merged_borders = False
+    while len(state.triangles) > target:
         report(np.log(len(triangles) / len(state.triangles)) / np.log(len(triangles) / target))
         excess = len(state.triangles) - target
-        advanced = _collapse_pass(state, rules, excess, BATCH_SHARE) or _collapse_pass(state, rules, excess, 1.0)
-        if advanced is None:
-            level += 1
-        else:
+        keep = not merged_borders
+        advanced = _collapse_pass(state, keep, excess, True) or _collapse_pass(state, keep, excess, False)
+        if advanced is not None:
             state = advanced
-    merged_borders = level > 0 and not RULES[min(level, len(RULES) - 1)].keep_features
+        elif merged_borders:
+            break
+        else:
+            merged_borders = True
     return CollapsedMesh(state.positions, state.triangles, state.source_triangle, state.vertex_map, merged_borders)
 
 
@@ -131,20 +135,27 @@ def _initial_state(
     return _compacted(state, np.arange(vertex_count))
 
 
-def _collapse_pass(state: _State, rules: Rules, excess: int, share: float) -> _State | None:
-    """The state after collapsing an independent set of the cheapest edges; None if no edge may be collapsed."""
-    edges = _edges(state, rules)
+def _collapse_pass(state: _State, keep_features: bool, excess: int, of_cheapest: bool) -> _State | None:
+    """The state after collapsing an independent set of the cheapest edges; None if no edge may be collapsed.
+
+    of_cheapest: whether only the cheapest edges are looked at, which is faster.
+    """
+    edges = _edges(state, keep_features)
     kind = _vertex_kinds(edges, len(state.positions))
     allowed = np.flatnonzero(_allowed_by_kind(edges, kind))
     position, cost = _best_positions(state, edges, kind, allowed)
-    count = max(int(share * len(edges.half.ends)), MINIMUM_BATCH)
-    order = np.argsort(cost, kind="stable") if count >= len(cost) else _cheapest(cost, count)
-    candidate, position = allowed[order], position[order]
+    count = max(int(BATCH_SHARE * len(edges.half.ends)), MINIMUM_BATCH)
+    order = _cheapest(cost, count) if of_cheapest and count < len(cost) else np.arange(len(cost))
+    candidate, position, cost = allowed[order], position[order], cost[order]
     legal = _link_condition(edges, candidate) & _survives(state, edges, candidate)
-    candidate, position = candidate[legal], position[legal]
-    sound = _shapes_hold(state, edges, candidate, position, rules)
-    candidate, position = candidate[sound], position[sound]
+    candidate, position, cost = candidate[legal], position[legal], cost[legal]
+    good, poor = _shapes_hold(state, edges, candidate, position)
+    order = np.flatnonzero(good | poor)
+    order = order[np.argsort(np.where(good, 1.0, POOR_SHAPE_PRICE)[order] * cost[order], kind="stable")]
+    candidate, position = candidate[order], position[order]
     chosen = _independent(edges, candidate, len(state.triangles))
+    if not of_cheapest:
+        chosen = chosen[chosen < max(int(BATCH_SHARE * len(candidate)), FEWEST_OF_ALL)]
     removed = np.cumsum(edges.half.face_count[candidate[chosen]])
     # The last collapse of the run may remove one triangle more than asked for, never fewer.
     chosen = chosen[: int(np.searchsorted(removed, excess)) + 1]
@@ -154,15 +165,14 @@ def _collapse_pass(state: _State, rules: Rules, excess: int, share: float) -> _S
 
 
 def _cheapest(cost: Float64, count: int) -> Int64:
-    part = np.argpartition(cost, count)[:count]
-    return part[np.argsort(cost[part], kind="stable")]
+    return np.sort(np.argpartition(cost, count)[:count])
 
 
-def _edges(state: _State, rules: Rules) -> _Edges:
+def _edges(state: _State, keep_features: bool) -> _Edges:
     vertex_count = len(state.positions)
     half = half_edges(state.triangles, vertex_count)
     feature = half.face_count != 2
-    if rules.keep_features:
+    if keep_features:
         face_group = np.repeat(state.group, 3)
         low = np.full(len(half.ends), -1)
         low[half.edge] = face_group
@@ -231,8 +241,8 @@ def _stars(edges: _Edges, candidate: Int64) -> tuple[Int64, Int64]:
     return np.concatenate([owner_a, owner_b]), np.concatenate([face_a, face_b])
 
 
-def _shapes_hold(state: _State, edges: _Edges, candidate: Int64, position: Float64, rules: Rules) -> Bool:
-    """Whether no triangle around the edge turns over or becomes a sliver."""
+def _shapes_hold(state: _State, edges: _Edges, candidate: Int64, position: Float64) -> tuple[Bool, Bool]:
+    """Whether all triangles around the edge keep GOOD shapes, and whether POOR ones: neither turned nor slivers."""
     owner, face = _stars(edges, candidate)
     vertex = state.triangles[face]
     a, b = edges.half.ends[candidate[owner]].T
@@ -243,13 +253,17 @@ def _shapes_hold(state: _State, edges: _Edges, candidate: Int64, position: Float
     normal, doubled, quality = _shape(*np.moveaxis(state.positions[state.triangles], 1, 0))
     turned = np.einsum("ij,ij->i", state.first_normal, normal)
     normal_after, doubled_after, quality_after = _shape(position[owner], *state.positions[following])
-    flipped = np.einsum("ij,ij->i", normal[face], normal_after) <= rules.minimum_turn_cosine
-    flipped &= doubled[face] > 0
+    turn = np.einsum("ij,ij->i", normal[face], normal_after)
     turned_after = np.einsum("ij,ij->i", state.first_normal[face], normal_after)
-    flipped |= turned_after < np.minimum(rules.minimum_turn_cosine, turned[face])
-    sliver = quality_after < np.minimum(rules.minimum_quality, quality[face])
-    sliver |= doubled_after <= 0
-    return np.bincount(owner[flipped | sliver], minlength=len(candidate)) == 0
+
+    def hold(shapes: Shapes) -> Bool:
+        flipped = (turn <= shapes.minimum_turn_cosine) & (doubled[face] > 0)
+        flipped |= turned_after < np.minimum(shapes.minimum_turn_cosine, turned[face])
+        sliver = quality_after < np.minimum(shapes.minimum_quality, quality[face])
+        sliver |= doubled_after <= 0
+        return np.bincount(owner[flipped | sliver], minlength=len(candidate)) == 0
+
+    return hold(GOOD), hold(POOR)
 
 
 def _shape(a: Float64, b: Float64, c: Float64) -> tuple[Float64, Float64, Float64]:
