@@ -38,13 +38,13 @@ class View:
             near = p[2, 3] / (p[2, 2] - 1.0)
             far = _far(p[2, 3], p[2, 2] + 1.0, near)
             start, length = near * way, (far - near) * float(np.linalg.norm(way))
-            way = way / np.linalg.norm(way)
         else:
             near, far = (-1.0 - p[2, 3]) / p[2, 2], (1.0 - p[2, 3]) / p[2, 2]
             start = np.array([(x - p[0, 3]) / p[0, 0], (y - p[1, 3]) / p[1, 1], near])
             way, length = np.array([0.0, 0.0, -1.0]), near - far
-        turn, eye = self.view[:3, :3].T, self.view[:3, 3]
-        return turn @ (start - eye), turn @ way, length
+        turn, eye = np.linalg.inv(self.view[:3, :3]), self.view[:3, 3]
+        direction = turn @ way
+        return turn @ (start - eye), direction / np.linalg.norm(direction), length
 
     def pixels(self, points: Float64) -> Float64:
         """(n, 2) where (n, 3) points show, NaN for what is behind the eye."""
