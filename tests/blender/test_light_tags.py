@@ -8,6 +8,7 @@ import pytest
 from vlm_addon.blender import light_tags, tag_pairing
 from vlm_addon.blender.light_faces import read_faces, select_faces, write_faces
 from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.light_meshes import new_tags
 from vlm_addon.blender.light_tags import assign_tag, clear_tag, tag_problem, unused_tag
 from vlm_addon.blender.source_faces import NO_FACE, read_source_faces
 from vlm_addon.blender.stored_links import read_links, write_links
@@ -15,6 +16,7 @@ from vlm_addon.blender.tag_separation import separate
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out
 from vlm_addon.core.progress import silent
+from vlm_addon.core.tag_pairs import FIRST_AUTOMATIC
 
 CONTEXT = bpy.context
 
@@ -265,6 +267,26 @@ def test_pairing_again_changes_nothing(make_grid, make_lights):
     assert stored_state() == before
 
 
+def test_ids_of_lights_that_are_gone_are_forgotten_and_those_of_artists_stay(make_grid, make_lights):
+    grid = make_grid(sides=2)
+    first = make_lights(((-0.5, 0, -0.1), 1.0), name="first")
+    run(tag_pairing.pair, first)
+    before = tags(grid)
+    write_faces(grid, "vlm_tag", np.array([before[0], before[1], before[2], 7]))
+    bpy.data.objects.remove(first)
+    second = make_lights(((0.0, 0, -0.1), 1.0), name="second")
+    run(tag_pairing.pair, second)
+    assert tags(grid)[3] == 7
+    assert len(set(tags(grid)[:3])) == 1
+    assert left_out().all()
+
+
+def test_ids_by_hand_are_below_those_of_pairing(make_grid, make_lights):
+    make_grid(sides=2)
+    run(tag_pairing.pair, make_lights(((0, 0, -0.1), 1.0)))
+    assert unused_tag() == new_tags(1)[0] == 1
+
+
 def test_an_id_given_by_hand_goes_to_the_lights(make_grid, make_lights):
     grid = make_grid(sides=2)
     grid["vlm_tag"] = 12
@@ -293,8 +315,8 @@ def test_both_sides_of_a_thin_shell_are_tagged_and_thick_bodies_are_not(make_mes
     on_sheet = make_lights(((0, 0, 0.99), 1.0), name="on sheet", sources=["sheet"])
     on_floor = make_lights(((0, 0, -1.1), 3.0), name="on floor", sources=["floor"])
     run(tag_pairing.pair_thin, on_sheet, on_floor)
-    assert (tags(on_sheet), tags(on_floor)) == ([1], [0])
-    assert tags(sheet) == [1, 1, 1, 1]
+    assert (tags(on_sheet), tags(on_floor)) == ([FIRST_AUTOMATIC], [0])
+    assert tags(sheet) == [FIRST_AUTOMATIC] * 4
     assert tags(floor) == [0]
 
 

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from ..core.errors import InvalidInput
 from ..core.scene import UNTAGGED
+from ..core.tag_pairs import is_automatic
 from .light_faces import read_faces
 from .names import (
     ID_PROPERTY,
@@ -165,7 +166,10 @@ def tags_of(thing: Any) -> npt.NDArray[np.int32]:
 
 
 def new_tags(count: int, things: Iterable[Any] | None = None) -> npt.NDArray[np.int32]:
-    """(count,) int32: tag ids that none of `things` (all objects of the file by default) carries, ascending."""
+    """(count,) int32: tag ids that none of `things` (all objects of the file by default) carries, ascending.
+
+    They are ids as artists give them, not those of pairing (core/tag_pairs.py).
+    """
     used = [tags_of(thing) for thing in (bpy.data.objects if things is None else things)]
-    largest = max((int(tags.max()) for tags in used if len(tags)), default=0)
+    largest = max((int(tags.max()) for each in used if len(tags := each[~is_automatic(each)])), default=0)
     return np.arange(max(largest, 0) + 1, max(largest, 0) + 1 + count, dtype=np.int32)

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.errors import InvalidInput
 from ..core.scene import UNTAGGED, Int32
+from ..core.tag_pairs import FIRST_AUTOMATIC, is_automatic
 from ..core.tags import next_tag
 from .availability import has_geometry
 from .light_colors import one_per_mesh
@@ -57,14 +58,34 @@ def tag_problem(context: Any) -> str | None:
 
 
 def unused_tag() -> int:
-    """The least id above all that lights, surfaces and links of the file carry. Raises InvalidInput without any."""
-    used = [tags_of(thing) for thing in bpy.data.objects]
-    links = [read_links(thing) for thing in bpy.data.objects if is_light_mesh(thing)]
-    tag = next_tag(*used, *links)
-    if tag > LARGEST_ID:
-        problem = f"the largest tag id, {LARGEST_ID}, is in use"
+    """The least id above all that artists have given to lights, surfaces and links. Raises InvalidInput without any."""
+    used = used_tags()
+    tag = next_tag(used[~is_automatic(used)])
+    if is_automatic(tag):
+        problem = f"the largest tag id that can be given by hand, {FIRST_AUTOMATIC - 1}, is in use"
         raise InvalidInput("tags", problem, "give a smaller one to what carries it (Assign Tag)")
     return tag
+
+
+def unused_automatic_tag() -> int:
+    """The least id above all of the file that pairing may give. Raises InvalidInput without any."""
+    tag = max(next_tag(used_tags()), FIRST_AUTOMATIC)
+    if tag > LARGEST_ID // 2:
+        raise InvalidInput("tags", f"the tag id {tag - 1} is in use", "clear the largest ones (Clear Tag)")
+    return tag
+
+
+def used_tags() -> Int32:
+    """All ids that lights, surfaces and links of the file carry, each once."""
+    surfaces = [tags_of(thing) for thing in bpy.data.objects if not is_light_mesh(thing)]
+    return np.unique(np.concatenate([tags_of_lights(), *surfaces]))
+
+
+def tags_of_lights() -> Int32:
+    """All ids that lights and links of the file carry, each once."""
+    things = [thing for thing in bpy.data.objects if is_light_mesh(thing) and thing.type == "MESH"]
+    found = [*map(tags_of, things), *(read_links(thing).ravel() for thing in things)]
+    return np.unique(np.concatenate([np.zeros(0, np.int32), *found]))
 
 
 def assign_tag(context: Any, tag: int) -> Tagged:

@@ -19,15 +19,15 @@ from ..core.light_links import make_links, no_links
 from ..core.light_mesh import VirtualLightMesh, empty_light_mesh
 from ..core.mesh_topology import Bool
 from ..core.progress import Progress
-from ..core.scene import Int32
-from ..core.tag_pairs import add_tags, unpaired
+from ..core.scene import UNTAGGED, Int32
+from ..core.tag_pairs import add_tags, is_automatic, unpaired
 from ..core.thin_surface import thin_triangles
 from .availability import has_geometry
 from .light_colors import one_per_mesh
 from .light_faces import face_count, read_faces
 from .light_geometry import light_faces_in_world
 from .light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
-from .light_tags import counted, unused_tag, write_tags
+from .light_tags import counted, tags_of_lights, unused_automatic_tag, write_tags
 from .names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
 from .region_pairs import RegionPairs, SourceLights, region_pairs
 from .source_faces import NO_FACE, SourceFaces, read_source_faces
@@ -39,7 +39,8 @@ class Tagging:
     """Lights and visible faces with their tags.
 
     names: of the light meshes. lights: the lights of each. light_tags: of all their faces, numbered through. links: of
-    each. source: the visible surface. unused: from here on no id is used in the file.
+    each. source: the visible surface. known: ids that lights and links of the file carry. unused: from here on no id
+    is used in the file.
     """
 
     names: tuple[str, ...]
@@ -47,6 +48,7 @@ class Tagging:
     light_tags: Int32
     links: tuple[Int32, ...]
     source: SourceFaces
+    known: Int32
     unused: int
 
     @property
@@ -101,7 +103,8 @@ def read_tagging(context: Any, things: Sequence[Any], objects: Sequence[Any] = (
         light_tags=np.concatenate([np.zeros(0, np.int32), *tags]),
         links=tuple(read_links(thing) for thing in things),
         source=source,
-        unused=unused_tag(),
+        known=tags_of_lights(),
+        unused=unused_automatic_tag(),
     )
 
 
@@ -152,14 +155,21 @@ def _paired(tagging: Tagging, pairs: RegionPairs, needed: Bool | None) -> Retagg
         kept &= needed[pairs.triangles]
     lights, faces = pairs.lights[kept], rows[kept].astype(np.int64)
     links = tagging.all_links
-    lit = unpaired(lights, faces, tagging.light_tags, tagging.source.tags, links)
+    face_tags = living_tags(tagging.source.tags, tagging.known)
+    lit = unpaired(lights, faces, tagging.light_tags, face_tags, links)
     missing = len(np.unique(np.stack([lights[lit], faces[lit]], axis=1), axis=0))
-    found = add_tags(lights, faces, tagging.light_tags, tagging.source.tags, links, tagging.unused)
+    found = add_tags(lights, faces, tagging.light_tags, face_tags, links, tagging.unused)
     new_links = [
         make_links(np.concatenate([before, found.links[np.isin(found.links[:, 0], tags)]]))
         for before, tags in zip(tagging.links, _by_light_mesh(tagging, found.light_tags), strict=True)
     ]
     return Retagged(tagging, found.light_tags, found.face_tags, tuple(new_links), missing)
+
+
+def living_tags(face_tags: Int32, known: Int32) -> Int32:
+    """`face_tags` without ids that pairing gave for lights that are gone: none of `known` any more."""
+    dead = is_automatic(face_tags) & ~np.isin(face_tags, known)
+    return np.where(dead, UNTAGGED, face_tags).astype(np.int32)
 
 
 def _by_light_mesh(tagging: Tagging, light_tags: Int32) -> list[Int32]:

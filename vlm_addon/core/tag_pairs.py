@@ -7,16 +7,25 @@ section 3.4; tags.py). What carries a tag keeps it; what is missing is added wit
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from .light_links import leaves_out, make_links
+from .light_mesh import VirtualLightMesh
 from .mesh_topology import Bool, Int64
 from .scene import UNTAGGED, Int32
 from .tags import RegionTags, region_tags
+
+FIRST_AUTOMATIC = 1 << 20
+"""Ids from here on are given by pairing, those below by hand: what was paired can be told from what an artist meant."""
+
+
+def is_automatic(tags: npt.ArrayLike) -> Bool:
+    """Whether ids were given by pairing."""
+    return np.asarray(tags) >= FIRST_AUTOMATIC
 
 
 def add_tags(
@@ -76,6 +85,31 @@ def _tag_faces(tags: Int32, faces: Int64, face_tags: Int32, first_tag: int) -> I
 def unpaired(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32, links: Int32) -> Bool:
     """(p,) whether the face of each pair is still lit by the light of the pair."""
     return ~leaves_out(links, light_tags[lights], face_tags[faces])
+
+
+@dataclass(frozen=True)
+class SurfaceFaces:
+    """Where the tags of visible triangles are kept. rows: for each mesh, (its triangles,) int32 row of `tags`, -1 for
+    none. tags: (f,) int32, the present ones. first_tag: from here on no id is used."""
+
+    rows: tuple[Int32, ...]
+    tags: Int32
+    first_tag: int
+
+
+def tag_regions(
+    light_mesh: VirtualLightMesh, light_of_triangle: Sequence[npt.ArrayLike], faces: SurfaceFaces
+) -> tuple[VirtualLightMesh, Int32]:
+    """The light mesh with tags and links, and the tags of `faces`, by which each face leaves out its own lights.
+
+    light_of_triangle: for each mesh, (its triangles,) int, -1 for none. Raises InvalidInput for too many links.
+    """
+    lights = np.concatenate([np.zeros(0, np.int64), *(np.asarray(part, np.int64) for part in light_of_triangle)])
+    rows = np.concatenate([np.zeros(0, np.int64), *faces.rows])
+    kept = (lights >= 0) & (rows >= 0)
+    tags, links = light_mesh.tag_ids, light_mesh.links
+    found = add_tags(lights[kept], rows[kept], tags, faces.tags, links, faces.first_tag)
+    return replace(light_mesh, tag_ids=found.light_tags, links=found.links), found.face_tags
 
 
 @dataclass(frozen=True)
