@@ -17,6 +17,7 @@ from . import (
     engine_panels,
     menus,
     migration,
+    overlays,
     panels,
     properties,
     render_panels,
@@ -25,7 +26,7 @@ from . import (
 )
 from .render_process import KEPT
 
-PARTS = (migration, bake_state, draw_tool, setting_presets, menus, translation)
+PARTS = (migration, bake_state, draw_tool, setting_presets, menus, translation, overlays)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()
