@@ -9,9 +9,10 @@ from typing import Any
 from .core.errors import InvalidInput
 from .core.light_mesh import VirtualLightMesh, require_valid
 from .core.progress import Progress, silent
-from .core.scene import Finding, SceneSnapshot
+from .core.scene import Finding, Int32, SceneSnapshot
 from .core.settings import OWN, setting
 from .core.simplify import SimplifyReport, SimplifySettings, create_light_mesh, subdivide_light_mesh
+from .core.tag_pairs import SurfaceFaces, tagged_by_map
 from .core.validate import check_light_mesh
 
 
@@ -38,11 +39,13 @@ class BakeSettings(SimplifySettings):
 @dataclass(frozen=True)
 class Bake:
     """A validated light mesh. creation: how it was made, None where the scene had one already. findings: what the
-    check, the creation and the extraction found, the check's first."""
+    check, the creation and the extraction found, the check's first. face_tags: (f,) int32, new tags of the surface
+    where some were asked for."""
 
     light_mesh: VirtualLightMesh
     creation: SimplifyReport | None
     findings: tuple[Finding, ...]
+    face_tags: Int32 | None = None
 
     def report(self) -> dict[str, Any]:
         """The bake as JSON-able values: counts, powers in m² under unit irradiance, milliseconds, findings."""
@@ -73,13 +76,15 @@ def bake(
     existing: VirtualLightMesh | None,
     settings: BakeSettings | None = None,
     progress: Progress = silent,
+    faces: SurfaceFaces | None = None,
 ) -> Bake:
     """The light mesh of a scene: `existing` where there is one and no `settings` ask for another, else a new one.
 
-    Raises InvalidInput where the scene shows no surface to make lights of, or `existing` holds values that are not
-    finite or negative; Cancelled.
+    faces: where given, a new light mesh and its surface get tags by which each face leaves out the lights that stand
+    for it. Raises InvalidInput where the scene shows no surface to make lights of, or `existing` holds values that are
+    not finite or negative, and for more links than there can be; Cancelled.
     """
-    creation = None
+    creation, face_tags, meshes = None, None, snapshot.meshes
     if existing is not None and settings is None:
         require_valid(existing)
         light_mesh = existing
@@ -90,8 +95,11 @@ def bake(
         chosen = settings or BakeSettings()
         created = create_light_mesh(snapshot.meshes, replace(chosen, target_triangles=chosen.shape_lights), progress)
         light_mesh, creation = created.light_mesh, created.report
+        if faces is not None:
+            light_mesh, face_tags = tagged_by_map(light_mesh, created.light_of_triangle, faces)
+            meshes = faces.tagged(meshes, face_tags)
         if chosen.split_share > 0.0:
             light_mesh = subdivide_light_mesh(light_mesh, chosen.target_triangles, chosen.samples_per_light)
-    findings = check_light_mesh(light_mesh, snapshot.meshes)
+    findings = check_light_mesh(light_mesh, meshes)
     made = creation.findings if creation is not None else ()
-    return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings))
+    return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings), face_tags)

@@ -65,12 +65,12 @@ class SourceFaces:
         return np.searchsorted(ends, rows, side="right")
 
 
-def read_source_faces() -> SourceFaces:
-    """The visible scene as a render shows it, with the stored face of each triangle. Raises InvalidInput."""
+def read_source_faces(options: ExtractOptions | None = None) -> SourceFaces:
+    """`extract_scene` with the stored face of each triangle. Raises InvalidInput."""
     places = _places()
     tags = _present_tags(places)
     with _faces_numbered(places):
-        numbered = extract_scene(ExtractOptions())
+        numbered = extract_scene(options)
     wholes = {place.name: place.first for place in places if not place.of_mesh}
     owners = tuple(_owners(mesh.name) for mesh in numbered.meshes)
     rows: list[Int32] = []

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import bpy
 import numpy as np
 
 from ..core.errors import InvalidInput
@@ -19,8 +18,8 @@ from ..core.light_links import make_links, no_links
 from ..core.light_mesh import VirtualLightMesh, empty_light_mesh
 from ..core.mesh_topology import Bool
 from ..core.progress import Progress
-from ..core.scene import UNTAGGED, Int32
-from ..core.tag_pairs import add_tags, is_automatic, unpaired
+from ..core.scene import Int32
+from ..core.tag_pairs import add_tags, living_tags, unpaired
 from ..core.thin_surface import thin_triangles
 from .availability import has_geometry
 from .light_colors import one_per_mesh
@@ -28,9 +27,10 @@ from .light_faces import face_count, read_faces
 from .light_geometry import light_faces_in_world
 from .light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
 from .light_tags import counted, tags_of_lights, unused_automatic_tag, write_tags
-from .names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
+from .names import TAG_ATTRIBUTE, is_light_mesh
 from .region_pairs import RegionPairs, SourceLights, region_pairs
 from .source_faces import NO_FACE, SourceFaces, read_source_faces
+from .source_tags import require_unchanged, write_face_tags
 from .stored_links import read_links, write_links
 
 
@@ -166,12 +166,6 @@ def _paired(tagging: Tagging, pairs: RegionPairs, needed: Bool | None) -> Retagg
     return Retagged(tagging, found.light_tags, found.face_tags, tuple(new_links), missing)
 
 
-def living_tags(face_tags: Int32, known: Int32) -> Int32:
-    """`face_tags` without ids that pairing gave for lights that are gone: none of `known` any more."""
-    dead = is_automatic(face_tags) & ~np.isin(face_tags, known)
-    return np.where(dead, UNTAGGED, face_tags).astype(np.int32)
-
-
 def _by_light_mesh(tagging: Tagging, light_tags: Int32) -> list[Int32]:
     ends = np.cumsum([each.faces.count for each in tagging.lights])
     return np.split(light_tags, ends[:-1]) if len(ends) else []
@@ -201,33 +195,18 @@ def write_retagged(context: Any, made: Retagged) -> Written:
     things = [
         _unchanged_light_mesh(context.scene, name, tags) for name, tags in zip(before.names, light_tags, strict=True)
     ]
-    places = [place for place in before.source.places if _differs(made, place.first, place.count)]
-    for place in places:
-        _require_unchanged(place.name, place.count if place.of_mesh else None)
+    require_unchanged(before.source, made.face_tags)
     for thing, tags, old, links in zip(things, light_tags, before.links, made.links, strict=True):
         write_tags(thing, tags)
         if not np.array_equal(old, links):
             write_links(thing, links)
-    for place in places:
-        thing = bpy.data.objects[place.name, None]
-        if place.of_mesh:
-            write_tags(thing, made.face_tags[place.first : place.first + place.count])
-        else:
-            thing[TAG_PROPERTY] = int(made.face_tags[place.first])
-            thing.update_tag()
-    changed = made.face_tags != before.source.tags
-    of_mesh = np.repeat([place.of_mesh for place in before.source.places], [p.count for p in before.source.places])
+    faces, objects = write_face_tags(before.source, made.face_tags)
     return Written(
         lights=int((made.light_tags != before.light_tags).sum()),
-        faces=int((changed & of_mesh).sum()),
-        objects=int((changed & ~of_mesh).sum()),
+        faces=faces,
+        objects=objects,
         links=sum(map(len, made.links)) - sum(map(len, before.links)),
     )
-
-
-def _differs(made: Retagged, first: int, count: int) -> bool:
-    rows = slice(first, first + count)
-    return not np.array_equal(made.face_tags[rows], made.before.source.tags[rows])
 
 
 def _unchanged_light_mesh(scene: Any, name: str, tags: Int32) -> Any:
@@ -236,12 +215,6 @@ def _unchanged_light_mesh(scene: Any, name: str, tags: Int32) -> Any:
         raise InvalidInput(f"light mesh {name!r}", "it was changed while its lights were paired", "pair them again")
     require_editable(thing)
     return thing
-
-
-def _require_unchanged(name: str, faces: int | None) -> None:
-    thing = bpy.data.objects.get((name, None))
-    if thing is None or (faces is not None and (not is_local(thing) or face_count(thing) != faces)):
-        raise InvalidInput(f"object {name!r}", "it was changed while lights were paired", "pair them again")
 
 
 def paired_text(made: Retagged, written: Written) -> str:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from .light_links import leaves_out, make_links
 from .light_mesh import VirtualLightMesh
 from .mesh_topology import Bool, Int64
-from .scene import UNTAGGED, Int32
+from .scene import UNTAGGED, Int32, Mesh
 from .tags import RegionTags, region_tags
 
 FIRST_AUTOMATIC = 1 << 20
@@ -26,6 +26,17 @@ FIRST_AUTOMATIC = 1 << 20
 def is_automatic(tags: npt.ArrayLike) -> Bool:
     """Whether ids were given by pairing."""
     return np.asarray(tags) >= FIRST_AUTOMATIC
+
+
+def living_tags(face_tags: Int32, known: Int32) -> Int32:
+    """`face_tags` without ids that pairing gave for lights that are gone: none of `known` any more."""
+    dead = is_automatic(face_tags) & ~np.isin(face_tags, known)
+    return np.where(dead, UNTAGGED, face_tags).astype(np.int32)
+
+
+def without_automatic(mesh: Mesh) -> Mesh:
+    """The mesh with the tags alone that artists have given: a new light mesh need not keep regions of an old one."""
+    return replace(mesh, tag_ids=np.where(is_automatic(mesh.tag_ids), UNTAGGED, mesh.tag_ids).astype(np.int32))
 
 
 def add_tags(
@@ -96,8 +107,13 @@ class SurfaceFaces:
     tags: Int32
     first_tag: int
 
+    def tagged(self, meshes: Sequence[Mesh], tags: Int32) -> tuple[Mesh, ...]:
+        """The meshes as they are with `tags`, (f,) int32, in place of the present ones."""
+        known = np.append(tags, np.int32(UNTAGGED))  # the row -1 is the last one
+        return tuple(replace(mesh, tag_ids=known[rows]) for mesh, rows in zip(meshes, self.rows, strict=True))
 
-def tag_regions(
+
+def tagged_by_map(
     light_mesh: VirtualLightMesh, light_of_triangle: Sequence[npt.ArrayLike], faces: SurfaceFaces
 ) -> tuple[VirtualLightMesh, Int32]:
     """The light mesh with tags and links, and the tags of `faces`, by which each face leaves out its own lights.
