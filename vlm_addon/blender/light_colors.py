@@ -18,11 +18,11 @@ from ..core.errors import InvalidInput
 from ..core.mesh_topology import Bool
 from ..core.scene import Float64
 from .light_faces import chosen_faces, read_faces, write_faces
+from .light_factors import NEUTRAL_HUE, NEUTRAL_STRENGTH, describe_factors
 from .light_geometry import LightFaces, light_faces_in_world
 from .light_meshes import require_editable
 from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, HUE_PROPERTY, LOCK_ATTRIBUTE, STRENGTH_PROPERTY
 
-NEUTRAL_HUE = (1.0, 1.0, 1.0)
 COLOR, EMISSION, BOTH = "COLOR", "EMISSION", "BOTH"
 QUANTITIES = (
     (COLOR, "Color", "What of the light that arrives is sent on: reflectance times your own factor"),
@@ -157,6 +157,7 @@ def set_strength(things: Sequence[Any], strength: float, hue: Sequence[float]) -
     for thing in things:
         thing[STRENGTH_PROPERTY] = float(strength)
         thing[HUE_PROPERTY] = tuple(float(value) for value in hue)
+        describe_factors(thing)
         thing.update_tag()
     return len(things)
 
@@ -164,7 +165,7 @@ def set_strength(things: Sequence[Any], strength: float, hue: Sequence[float]) -
 def strength_of(thing: Any) -> tuple[float, tuple[float, ...]]:
     """Strength and hue of a light mesh object."""
     hue = tuple(float(value) for value in thing.get(HUE_PROPERTY, NEUTRAL_HUE))
-    return float(thing.get(STRENGTH_PROPERTY, 1.0)), hue
+    return float(thing.get(STRENGTH_PROPERTY, NEUTRAL_STRENGTH)), hue
 
 
 def light_mesh_count(count: int) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from .light_factors import describe_factors
 from .light_meshes import is_local, light_meshes, set_sources, source_names
 from .names import SCHEMA_PROPERTY, SCHEMA_VERSION, SOURCES_PROPERTY
 
@@ -25,6 +26,7 @@ def migrate_file() -> int:
 def _migrate(thing: Any, scene: Any) -> bool:
     if not is_local(thing) or int(thing[SCHEMA_PROPERTY]) >= SCHEMA_VERSION:
         return False
+    describe_factors(thing)
     if SOURCES_PROPERTY in thing:
         set_sources(thing, source_names(thing), scene)
     thing[SCHEMA_PROPERTY] = SCHEMA_VERSION

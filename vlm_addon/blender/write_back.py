@@ -15,6 +15,7 @@ from ..core.light_links import make_links, no_links
 from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.scene import Float64, Int32
 from .color_space import convert, rec709_to_working
+from .light_factors import set_neutral_factors
 from .light_meshes import set_sources
 from .names import (
     AREA_SCALE_ATTRIBUTE,
@@ -22,10 +23,8 @@ from .names import (
     COLOR_ATTRIBUTE,
     DYNAMIC_PROPERTY,
     EMISSION_ATTRIBUTE,
-    HUE_PROPERTY,
     SCHEMA_PROPERTY,
     SCHEMA_VERSION,
-    STRENGTH_PROPERTY,
     TAG_ATTRIBUTE,
     is_light_mesh,
 )
@@ -50,8 +49,7 @@ def write_light_mesh(light_mesh: VirtualLightMesh, name: str, sources: Sequence[
     if existing is None:
         blender_object = bpy.data.objects.new(name, mesh)
         _collection(scene).objects.link(blender_object)
-        blender_object[STRENGTH_PROPERTY] = 1.0
-        blender_object[HUE_PROPERTY] = (1.0, 1.0, 1.0)
+        set_neutral_factors(blender_object)
     else:
         blender_object = existing
         _replace_mesh(blender_object, mesh, name)
