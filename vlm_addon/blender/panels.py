@@ -7,12 +7,12 @@ from typing import Any
 
 import bpy
 
-from . import authoring, availability, bake_state, light_tags, workflow
+from . import authoring, availability, bake_state, light_tags, overlays, workflow
 from .draw_tool import TOOLS, tool_name
 from .findings import fixable_kinds
 from .light_meshes import light_meshes
 from .names import HUE_PROPERTY, STRENGTH_PROPERTY, is_light_mesh
-from .panel_layout import SidebarPanel, hint, wrapped
+from .panel_layout import SidebarPanel, hint, labelled, wrapped
 from .setting_presets import VLM_PT_presets
 from .workflow import Step
 
@@ -181,6 +181,30 @@ class VLM_PT_bake(SidebarPanel, bpy.types.Panel):  # noqa: N801
         _buttons(self.layout, workflow.BAKE)
 
 
+class VLM_PT_view(SidebarPanel, bpy.types.Panel):  # noqa: N801
+    """What the 3D views show of light meshes."""
+
+    bl_label = workflow.VIEW.label
+
+    def draw_header(self, context: Any) -> None:
+        """Whether anything is shown."""
+        self.layout.prop(overlays.settings_of(context), "show", text="")
+
+    def draw(self, context: Any) -> None:
+        """What is shown, and the button that makes the light grid's cells."""
+        layout, settings = self.layout, overlays.settings_of(context)
+        column = layout.column()
+        column.active = settings.show
+        labelled(column, settings, "fill")
+        column.prop(settings, "opacity", slider=True)
+        for name in ("sides", "findings", "in_front", "half_balls", "grid"):
+            column.prop(settings, name)
+        if settings.grid:
+            labelled(column, settings, "grid_place")
+            _buttons(column, workflow.VIEW)
+        hint(layout, context, overlays.overlay_hint(context))
+
+
 class VLM_PT_support(SidebarPanel, bpy.types.Panel):  # noqa: N801
     """Help, and what to send along when something fails."""
 
@@ -201,6 +225,7 @@ CLASSES = (
     VLM_PT_check,
     VLM_PT_animate,
     VLM_PT_bake,
+    VLM_PT_view,
 )
 LAST_CLASSES = (VLM_PT_support,)
 """Below the panels of rendering."""

@@ -81,13 +81,14 @@ BAKE = Step(
         ("clear_bake", "TRASH"),
     ),
 )
+VIEW = Step("view", "View", _buttons(("show_light_grid", "LIGHTPROBE_VOLUME")))
 SUPPORT = Step(
     "support",
     "Support",
     _buttons(("open_documentation", "HELP"), ("copy_diagnostics", "COPYDOWN"), ("show_licences", "TEXT")),
 )
 
-STEPS = (CREATE, DETAIL, DRAW, COLOR, TAGS, CHECK, ANIMATE, BAKE, SUPPORT)
+STEPS = (CREATE, DETAIL, DRAW, COLOR, TAGS, CHECK, ANIMATE, BAKE, VIEW, SUPPORT)
 
 ELSEWHERE = (
     "vlm.add_preset",
