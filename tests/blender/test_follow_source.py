@@ -16,6 +16,7 @@ from vlm_addon.blender.surface_transfer import evaluated_surface
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
+from vlm_addon.core.progress import silent
 
 INSET = 0.02
 
@@ -396,6 +397,48 @@ def test_a_selected_object_is_followed_in_place_of_what_it_was_made_from(make_cu
     assert lights["vlm_sources"] == "Other"
 
 
+def test_a_light_mesh_that_is_made_anew_follows_again_with_its_new_shape(bent_sheet, scene):
+    ensure_scene_settings()
+    scene.frame_set(5)
+    bpy.ops.object.select_all(action="DESELECT")
+    bent_sheet.select_set(True)
+    bpy.context.view_layer.objects.active = bent_sheet
+    make = authoring.from_selection(bpy.context, BakeSettings(target_triangles=30))
+    authoring.write(make(silent))
+    lights = bpy.data.objects["VLM Sheet"]
+    follow_sources(lights, bpy.context)
+    scene.frame_set(14)
+    again = authoring.from_selection(bpy.context, BakeSettings(target_triangles=60))(silent)
+    assert authoring.write(again).endswith("it follows Sheet again")
+    assert np.abs(np.sort(place(lights), axis=0) - np.sort(again.bake.light_mesh.vertices, axis=0)).max() < 1e-5
+    assert [modifier.name for modifier in lights.modifiers] == ["Follow: Armature"]
+    scene.frame_set(20)
+    assert np.abs(np.sort(place(lights), axis=0) - np.sort(again.bake.light_mesh.vertices, axis=0)).max() > 0.05
+
+
+def test_made_anew_from_other_objects_it_follows_nothing_and_says_so(bent_sheet, make_cube, scene):
+    ensure_scene_settings()
+    cube = make_cube()
+    lights = lights_behind(bent_sheet)
+    follow_sources(lights, bpy.context)
+    lights.name = "VLM Cube"
+    bpy.ops.object.select_all(action="DESELECT")
+    cube.select_set(True)
+    bpy.context.view_layer.objects.active = cube
+    said = authoring.write(authoring.from_selection(bpy.context, BakeSettings(target_triangles=30))(silent))
+    assert "follows nothing any more" in said
+    assert (lights.parent, len(lights.modifiers)) == (None, 0)
+
+
+def test_a_light_mesh_that_stands_still_while_its_source_moves_is_found(bent_sheet, make_cube, scene):
+    lights = lights_behind(bent_sheet)
+    lights_behind(make_cube(), "VLM Cube")
+    (finding,) = animation.left_behind(scene)
+    assert "'Sheet', which it was made from, moves" in str(finding)
+    follow_sources(lights, bpy.context)
+    assert animation.left_behind(scene) == []
+
+
 @pytest.mark.parametrize(
     ("break_it", "remedy"),
     [
@@ -434,7 +477,7 @@ def test_a_new_light_mesh_of_the_dancer_dances_as_close_to_her_as_it_was_made(sa
     bpy.ops.object.select_all(action="DESELECT")
     for name in ("Dancer", "Skirt"):
         bpy.data.objects[name].select_set(True)
-    made = authoring.from_selection(context, BakeSettings(target_triangles=400))(lambda fraction, label: True)
+    made = authoring.from_selection(context, BakeSettings(target_triangles=400))(silent)
     authoring.write(made)
     follow_sources(bpy.data.objects[made.name], context)
     followers = {thing.parent.name: thing for thing in scene.objects if "vlm_schema" in thing and thing.parent}

@@ -5,12 +5,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..core.errors import VlmError
+from ..core.scene import Finding
 from .availability import has_geometry
+from .dynamics import is_dynamic
 from .follow_rig import is_following
 from .follow_source import AUTO, Following, follow_sources, require_followable, stop_following
-from .light_meshes import chosen_light_meshes, is_local, require_editable
+from .light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
 
 MILLIMETRES = 1000.0
+LEFT_BEHIND = "left_behind"
+"""Kind of a finding."""
 
 
 def follow_problem(context: Any) -> str | None:
@@ -45,6 +50,40 @@ def free(context: Any) -> int:
     for thing in things:
         require_editable(thing)
     return sum(stop_following(thing, context) for thing in things)
+
+
+def followed_by(name: str, scene: Any) -> Any | None:
+    """What a light mesh that is about to be made anew follows; None where it is new or follows nothing."""
+    thing = scene.objects.get(name)
+    return thing.parent if thing is not None and is_following(thing) else None
+
+
+def follow_again(thing: Any, followed: Any | None, context: Any) -> str:
+    """Let a light mesh that was made anew follow what it followed, with its new shape; returns what to add to a report.
+
+    Where that is not what it now stands for alone, or cannot be bound at this frame, it stands still.
+    """
+    if not is_following(thing):
+        return ""
+    stop_following(thing, context)
+    if followed is None or sources(thing, context.scene) != [followed]:
+        return "; it follows nothing any more: use Follow Source"
+    try:
+        follow_sources(thing, context)
+    except VlmError as error:
+        return f"; it follows nothing any more ({error})"
+    return f"; it follows {followed.name} again"
+
+
+def left_behind(scene: Any) -> list[Finding]:
+    """A finding for each light mesh that stands still while something that it was made from moves."""
+    found = []
+    for thing in light_meshes(scene):
+        moving = [source.name for source in sources(thing, scene) if source is not None and is_dynamic(source)]
+        if moving and not is_dynamic(thing):
+            problem = f"it stands still and {moving[0]!r}, which it was made from, moves"
+            found.append(Finding(f"light mesh {thing.name!r}", problem, "use Follow Source", kind=LEFT_BEHIND))
+    return found
 
 
 def _selection_problem(context: Any) -> str | None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 from typing import Any
 
 COLLECTION = "Virtual Light Meshes"
+NAME = "VLM"
+"""What names of light meshes that we make begin with."""
 
 SCHEMA_VERSION = 2
 SCHEMA_PROPERTY = "vlm_schema"

@@ -9,9 +9,9 @@ from typing import Any
 import bmesh
 import numpy as np
 
-from .authoring import NAME
 from .light_meshes import set_sources, source_names
 from .mesh_arrays import read
+from .names import NAME
 from .surface_transfer import evaluated_surface, nearest, normals_to_world, to_world
 
 
