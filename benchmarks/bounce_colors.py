@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figure 5.5 of seed 002 again: the red wall of cornell_box bounces blue, or five times as strong, or both.
 
-`./dev bench bounce_colors` writes bounce_colors.png into docs/ and prints what changed: the mean indirect irradiance by
+`./dev bench bounce_colors` writes authoring_colors.png into docs/ and prints what changed: the mean indirect irradiance by
 channel, and the largest change of the direct light, which must be none.
 """
 
@@ -54,7 +54,7 @@ def main() -> None:
     print(table(HEADER, rows))
     shown = [(name, displayed(OUT / "one.png", rgb(frame.images["combined"]))) for name, frame in frames.items()]
     (OUT / "one.png").unlink()
-    side_by_side(shown).save(OUT / "bounce_colors.png")
+    side_by_side(shown).save(OUT / "authoring_colors.png")
 
 
 def _changed(

@@ -74,11 +74,14 @@ def test_there_is_one_zip_for_each_platform(built):
 @pytest.mark.parametrize("platform", PYTHONS)
 def test_a_zip_holds_the_sources_that_ship_and_nothing_else(built, platform):
     folders = {"vlm_addon": ".py", "operators": ".py", "gpu_shaders": ""}
+    manual = "docs/authoring"
     roots = {"__init__.py", "blender_manifest.toml", "LICENSE", "README.md"}
     ships = {
         name
         for name in checkout_files()
-        if name in roots or ("/" in name and name.endswith(folders.get(name.split("/")[0], "no such file")))
+        if name in roots
+        or name.startswith(manual)
+        or ("/" in name and name.endswith(folders.get(name.split("/")[0], "no such file")))
     }
     sources = [name for name in names_in(built[platform]) if not name.startswith("wheels/")]
     assert sorted(sources) == sorted(ships)
