@@ -24,6 +24,7 @@ MANIFEST = ROOT / "blender_manifest.toml"
 CHECKSUMS = ROOT / "tools" / "wheels.sha256"
 
 ROOT_FILES = ("__init__.py", "blender_manifest.toml", "LICENSE", "README.md")
+MANUAL = ("docs/authoring.md", "docs/authoring_*.png")
 SOURCE_SUFFIXES = {
     "operators": {".py"},
     "vlm_addon": {".py"},
@@ -118,6 +119,7 @@ def _download(wheel: Wheel, folder: Path) -> None:
 def expected_contents(wheels: Iterable[Wheel], platform: str) -> set[str]:
     """Paths inside the zip of `platform`: the allow-list of what ships."""
     contents = {name for name in ROOT_FILES if (ROOT / name).exists()}
+    contents |= {path.relative_to(ROOT).as_posix() for pattern in MANUAL for path in ROOT.glob(pattern)}
     for folder, suffixes in SOURCE_SUFFIXES.items():
         sources = (path for path in (ROOT / folder).rglob("*") if path.suffix in suffixes)
         contents |= {path.relative_to(ROOT).as_posix() for path in sources}
