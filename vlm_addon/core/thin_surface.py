@@ -25,8 +25,10 @@ from .triangle_tree import TriangleTree, build_tree
 BACK_RAYS = 16
 # So many of them first; only where one meets a front, the others.
 FIRST_RAYS = 4
-# Share of these that must meet the front of something.
+# Share of these that must meet the front of something, more than meet backs or what lies close behind.
 SEEN_SHARE = 0.25
+# What is nearer to the back of a region than this share of its extent hides it.
+GAP_SHARE = 0.25
 # A ray starts this share of the scene's half diagonal behind its surface.
 START_SHARE = 1e-6
 
@@ -116,25 +118,38 @@ def two_sided(lights: Int32, corners: Float64, is_open: Bool, tree: TriangleTree
     _, region = np.unique(lights[rows], return_inverse=True)
     count = int(region.max()) + 1
     points, directions = _back_rays(corners[rows], region, count)
-    faced = np.zeros(count, np.int64)
+    gap = GAP_SHARE * _extents(corners[rows], region, count)
+    faced, hidden = np.zeros(count, np.int64), np.zeros(count, np.int64)
     looked_at = np.arange(count)
     for rays in (np.arange(FIRST_RAYS), np.arange(FIRST_RAYS, BACK_RAYS)):
         which = (looked_at[:, None] * BACK_RAYS + rays).ravel()
-        meets = _meets_fronts(points[which], directions[which], corners, tree)
-        faced[looked_at] += meets.reshape(len(looked_at), len(rays)).sum(axis=1)
+        fronts, others = _met_sides(points[which], directions[which], np.repeat(gap[looked_at], len(rays)), tree)
+        faced[looked_at] += fronts.reshape(-1, len(rays)).sum(axis=1)
+        hidden[looked_at] += others.reshape(-1, len(rays)).sum(axis=1)
         # What is faced at all often enough shows in the first rays.
         looked_at = np.flatnonzero(faced > 0)
-    seen[rows] = (faced >= SEEN_SHARE * BACK_RAYS)[region]
+    seen[rows] = ((faced >= SEEN_SHARE * BACK_RAYS) & (faced > hidden))[region]
     return seen
 
 
-def _meets_fronts(points: Float64, directions: Float64, corners: Float64, tree: TriangleTree) -> Bool:
-    """(r,) whether the first triangle that each ray from just off `points` meets shows its front."""
+def _extents(corners: Float64, region: Int64, count: int) -> Float64:
+    """(count,) m: diagonal of the box of each region's triangles."""
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, region, corners.min(axis=1))
+    np.maximum.at(high, region, corners.max(axis=1))
+    extents: Float64 = np.linalg.norm(high - low, axis=1)
+    return extents
+
+
+def _met_sides(points: Float64, directions: Float64, gap: Float64, tree: TriangleTree) -> tuple[Bool, Bool]:
+    """((r,) whether each ray from just off `points` first meets a front farther off than the gap, or else anything)."""
+    corners = tree.corners
     diagonal = float(np.linalg.norm(corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))))
-    met = tree.first_met(points + START_SHARE * diagonal * directions, points + diagonal * directions)
+    start = points + START_SHARE * diagonal * directions
+    met, fraction = tree.first_met_at(start, points + diagonal * directions)
     facing = np.einsum("ij,ij->i", _unit_normals(corners[met]), directions) < 0
-    found: Bool = (met >= 0) & facing
-    return found
+    front: Bool = (met >= 0) & facing & (fraction * diagonal > gap)
+    return front, (met >= 0) & ~front
 
 
 def _back_rays(corners: Float64, region: Int64, count: int) -> tuple[Float64, Float64]:

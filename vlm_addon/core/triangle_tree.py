@@ -46,7 +46,25 @@ class TriangleTree:
 
     def first_met(self, origins: Float64, ends: Float64, from_behind: bool = False) -> Int64:
         """(r,) int64: the triangle that `first_hits` finds, -1 for none."""
-        return _first_hits(self, origins, ends, from_behind)[1]
+        return self.first_met_at(origins, ends, from_behind)[0]
+
+    def first_met_at(self, origins: Float64, ends: Float64, from_behind: bool = False) -> tuple[Int64, Float64]:
+        """`first_met` and `first_hits` of each segment."""
+        fraction, met = _first_hits(self, origins, ends, from_behind)
+        return met, fraction
+
+    def all_met(self, origins: Float64, ends: Float64) -> tuple[Int64, Int64]:
+        """(segment, triangle), each (k,) int64: all triangles that each segment meets, from either side."""
+        segments, triangles = [], []
+        for first in range(0, len(origins), SEGMENTS_PER_BATCH):
+            rows = slice(first, first + SEGMENTS_PER_BATCH)
+            segment, triangle = _met_boxes(self, origins[rows], ends[rows])
+            corners = self.corners[triangle]
+            hit = np.isfinite(_intersections(corners, origins[rows][segment], ends[rows][segment], False))
+            segments.append(first + segment[hit])
+            triangles.append(triangle[hit])
+        none = np.zeros(0, np.int64)
+        return np.concatenate([none, *segments]), np.concatenate([none, *triangles])
 
 
 def build_tree(corners: Float64) -> TriangleTree:

@@ -4,15 +4,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from . import finding_kinds as kinds
+from .light_links import leaves_out
 from .light_mesh import VirtualLightMesh
-from .mesh_topology import Bool, Int64
+from .light_overlaps import badly_joined, covered_twice
+from .mesh_topology import Bool, sum_by
+from .nearest_lights import light_of_triangles
 from .placement import insets
-from .scene import Finding, Float64, Mesh
+from .scene import Finding, Float64, Int32, Mesh
+from .thin_surface import open_triangles, thin_against, two_sided
+from .triangle_tree import build_tree
 
 Rows = npt.NDArray[Any]
 
@@ -28,18 +35,47 @@ INSIDE_OUT_COSINE = -0.3
 
 
 def check_light_mesh(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh] = ()) -> tuple[Finding, ...]:
-    """Findings on `light_mesh`, the gravest first; none for a sound one.
+    """Findings on `light_mesh`, the gravest first; none for a sound one. Their kinds are those of finding_kinds.py.
 
-    meshes: the visible surface, for tags that lights and surface should share. Reflectance is judged by colour alone;
-    the strength that makes up for lost area is expected to exceed 1.
+    meshes: the visible surface, for what lights and surface should share: tags, and whether a body is too thin for its
+    lights. Reflectance is judged by colour alone; the strength that makes up for lost area is expected to exceed 1.
     """
     if not len(light_mesh):
-        return (Finding(SUBJECT, "it has no lights", "create it from a selection, or draw lights"),)
+        return (Finding(SUBJECT, "it has no lights", "create it from a selection, or draw lights", kinds.EMPTY),)
     broken = _broken(light_mesh)
     if broken:
         return tuple(broken)
-    found = [*_degenerate(light_mesh), *_source_findings(light_mesh), *_bright(light_mesh), *_tags(light_mesh, meshes)]
-    return tuple(found)
+    surface = _surface(light_mesh, meshes)
+    found = [*_degenerate(light_mesh), *_joints(light_mesh), *_source_findings(light_mesh, surface)]
+    return (*found, *_bright(light_mesh), *_lost_tags(light_mesh, meshes))
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """The visible surface as far as tags matter: each light is the nearest one of its triangles. excused: (n,) share by
+    area of the region of each light that leaves it out. thin, two_sided: (n,) such shares of what does not."""
+
+    excused: Float64
+    thin: Float64
+    two_sided: Float64
+
+
+def _surface(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> _Surface:
+    filled = [mesh for mesh in meshes if len(mesh.triangles)]
+    count = len(light_mesh)
+    if not filled:
+        return _Surface(np.zeros(count), np.zeros(count), np.zeros(count))
+    corners = np.concatenate([mesh.positions[mesh.triangles] for mesh in filled])
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    lights = light_of_triangles(light_mesh.corners, corners).astype(np.int64)
+    tags = np.concatenate([mesh.tag_ids for mesh in filled])
+    left_out = leaves_out(light_mesh.links, light_mesh.tag_ids[lights], tags)
+    tree = build_tree(corners)
+    asked = np.where(left_out, -1, lights).astype(np.int32)
+    thin = thin_against(light_mesh.corners, asked, corners, tree)
+    seen = two_sided(asked, corners, open_triangles(filled), tree)
+    total = np.maximum(sum_by(lights, area, count), np.finfo(float).tiny)
+    return _Surface(*(sum_by(lights, area * chosen, count) / total for chosen in (left_out, thin, seen)))
 
 
 def _broken(light_mesh: VirtualLightMesh) -> list[Finding]:
@@ -52,24 +88,33 @@ def _broken(light_mesh: VirtualLightMesh) -> list[Finding]:
         "emission": light_mesh.emission,
     }
     for name, rows in values.items():
-        _append(found, ~np.isfinite(rows).all(axis=1), rows, f"a {name} that is not finite", "repair or delete them")
+        bad = ~np.isfinite(rows).all(axis=1)
+        _append(found, bad, rows, f"a {name} that is not finite", "repair or delete them", kinds.NOT_FINITE)
     for name in ("colour", "emission", "strength"):
-        negative = (values[name] < 0).any(axis=1)
-        _append(found, negative, values[name], f"a negative {name}", "use values of at least 0")
+        bad = (values[name] < 0).any(axis=1)
+        _append(found, bad, values[name], f"a negative {name}", "use values of at least 0", kinds.NEGATIVE)
     samples = light_mesh.samples
     finite = np.isfinite(samples.positions).all(axis=1) & np.isfinite(samples.normals).all(axis=1)
-    if not (finite & np.isfinite(samples.weights)).all():
+    finite &= np.isfinite(samples.weights)
+    if not finite.all():
         problem = f"{int((~finite).sum())} source samples are not finite"
-        found.append(Finding(SUBJECT, problem, "repair the visible surface and create the lights again"))
+        owner = np.repeat(np.arange(len(light_mesh)), np.diff(samples.offsets))
+        remedy = "repair the visible surface and create the lights again"
+        found.append(Finding(SUBJECT, problem, remedy, kinds.BAD_SAMPLES, _rows(np.unique(owner[~finite]))))
     return found
 
 
-def _append(found: list[Finding], bad: Bool, values: Rows, problem: str, remedy: str) -> None:
+def _append(found: list[Finding], bad: Bool, values: Rows, problem: str, remedy: str, kind: str) -> None:
     if bad.any():
         first = int(np.argmax(bad))
         shown = np.array2string(np.asarray(values[first]), precision=4, separator=", ")
         lights = "1 light has" if bad.sum() == 1 else f"{int(bad.sum())} lights have"
-        found.append(Finding(SUBJECT, f"{lights} {problem} (first: light {first}, {shown})", remedy))
+        problem = f"{lights} {problem} (first: light {first}, {shown})"
+        found.append(Finding(SUBJECT, problem, remedy, kind, _rows(np.flatnonzero(bad))))
+
+
+def _rows(lights: Rows) -> tuple[int, ...]:
+    return tuple(int(light) for light in lights)
 
 
 def _degenerate(light_mesh: VirtualLightMesh) -> list[Finding]:
@@ -78,7 +123,27 @@ def _degenerate(light_mesh: VirtualLightMesh) -> list[Finding]:
     squares = np.einsum("ijk,ijk->i", sides, sides)
     quality = 4 * np.sqrt(3.0) * light_mesh.areas / np.where(squares > 0, squares, 1.0)
     found: list[Finding] = []
-    _append(found, quality <= LEAST_QUALITY, light_mesh.areas, "no area, in m²", "delete them or merge their vertices")
+    remedy = "delete them or merge their vertices"
+    _append(found, quality <= LEAST_QUALITY, light_mesh.areas, "no area, in m²", remedy, kinds.DEGENERATE)
+    return found
+
+
+def _joints(light_mesh: VirtualLightMesh) -> list[Finding]:
+    """Neighbours that face against each other, and lights that lie on others."""
+    found: list[Finding] = []
+    crossed = badly_joined(light_mesh)
+    if crossed.any():
+        lights = "1 light faces" if crossed.sum() == 1 else f"{int(crossed.sum())} lights face"
+        problem = f"{lights} against the lights beside (first: light {int(np.argmax(crossed))})"
+        remedy = "flip them, so that all of a surface shine to one side"
+        found.append(Finding(SUBJECT, problem, remedy, kinds.NON_MANIFOLD, _rows(np.flatnonzero(crossed))))
+    twice = covered_twice(light_mesh)
+    if twice.any():
+        lights = "1 light lies" if twice.sum() == 1 else f"{int(twice.sum())} lights lie"
+        problem = (
+            f"{lights} on others that face alike, so its bounce counts twice (first: light {int(np.argmax(twice))})"
+        )
+        found.append(Finding(SUBJECT, problem, "delete them", kinds.OVERLAPPING, _rows(np.flatnonzero(twice))))
     return found
 
 
@@ -87,56 +152,86 @@ def _bright(light_mesh: VirtualLightMesh) -> list[Finding]:
     # float32 means of a white surface may end one rounding step above 1.
     bright = (light_mesh.colour > 1.0 + 1e-6).any(axis=1)
     problem = "a reflectance above 1: more light leaves than arrives, which is not physical but allowed"
-    _append(found, bright, light_mesh.colour, problem, "lower the colour if this is not meant")
+    _append(found, bright, light_mesh.colour, problem, "lower the colour if this is not meant", kinds.BRIGHT)
     return found
 
 
-def _source_findings(light_mesh: VirtualLightMesh) -> list[Finding]:
+def _source_findings(light_mesh: VirtualLightMesh, surface: _Surface) -> list[Finding]:
     samples = light_mesh.samples
     counts = np.diff(samples.offsets)
     found: list[Finding] = []
     unsampled = (counts == 0) & (light_mesh.colour.max(axis=1) > 0)
     problem, remedy = "no source samples, so no light reaches them", "move them closer behind a visible surface"
-    _append(found, unsampled, counts, problem, remedy)
+    _append(found, unsampled, counts, problem, remedy, kinds.UNSAMPLED)
     owner = np.repeat(np.arange(len(light_mesh)), counts)
     area = light_mesh.areas
     normal = light_mesh.area_vectors / np.where(area > 0, area, 1.0)[:, None]
     weight = samples.weights.astype(np.float64)
-    facing = np.bincount(owner, weights=weight * (samples.normals * normal[owner]).sum(axis=1), minlength=len(area))
+    facing = sum_by(owner, weight * (samples.normals * normal[owner]).sum(axis=1), len(area))
     reversed_ = (counts > 0) & (area > 0) & (facing < INSIDE_OUT_COSINE)
     problem = "their front away from the surface they stand for (mean cosine)"
-    _append(found, reversed_, facing, problem, "flip their normals")
-    found.extend(_in_front(light_mesh, owner, normal, weight, reversed_))
+    _append(found, reversed_, facing, problem, "flip their normals", kinds.INSIDE_OUT)
+    share, depth = _in_front(light_mesh, normal)
+    share = np.where(reversed_, 0.0, share)
+    found.extend(_depth_findings(share, depth, surface))
     return found
 
 
-def _in_front(
-    light_mesh: VirtualLightMesh, owner: Int64, normal: Float64, weight: Float64, ignored: Bool
-) -> list[Finding]:
-    """Lights whose plane stands in front of their own surface (seed 002, section 3.4, figure 3.5)."""
-    corners = light_mesh.corners
-    offset = light_mesh.samples.positions - corners[owner, 0]
+def _in_front(light_mesh: VirtualLightMesh, normal: Float64) -> tuple[Float64, Float64]:
+    """((n,) share of the surface of each light that lies behind its plane, (n,) m, how far); seed 002, figure 3.5."""
+    samples, corners = light_mesh.samples, light_mesh.corners
+    owner = np.repeat(np.arange(len(light_mesh)), np.diff(samples.offsets))
+    offset = samples.positions - corners[owner, 0]
     depth = -np.einsum("ij,ij->i", offset, normal[owner])
     noticeable = np.maximum(NOTICEABLE_DEPTH * np.sqrt(light_mesh.areas), insets(corners))
     behind = depth > noticeable[owner]
-    share = np.bincount(owner, weights=weight * behind, minlength=len(light_mesh))
-    bad = (share > NOTICEABLE_SHARE) & ~ignored
-    if not bad.any():
-        return []
-    deepest = float(depth[behind & bad[owner]].max())
-    lights = "1 light stands" if bad.sum() == 1 else f"{int(bad.sum())} lights stand"
-    problem = (
-        f"{lights} in front of the surface (first: light {int(np.argmax(bad))}, {share[np.argmax(bad)]:.0%} of it; "
-        f"deepest {deepest:.3g} m)"
-    )
-    return [Finding(SUBJECT, problem, "move them behind it, or give both a common tag where the body is thin")]
+    share = sum_by(owner, samples.weights.astype(np.float64) * behind, len(light_mesh))
+    deepest = np.zeros(len(light_mesh))
+    np.maximum.at(deepest, owner, depth)
+    return share, deepest
 
 
-def _tags(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> list[Finding]:
-    known = np.unique(np.concatenate([mesh.tag_ids for mesh in meshes])) if meshes else np.zeros(0, np.int32)
-    lost = (light_mesh.tag_ids != 0) & ~np.isin(light_mesh.tag_ids, known)
+def _depth_findings(share: Float64, depth: Float64, surface: _Surface) -> list[Finding]:
+    """What stands in front, apart where the body is too thin to move it (figure 3.7) or has no inside (figure 3.6)."""
+    open_ = surface.excused < 1.0 - NOTICEABLE_SHARE
+    stands = (share > NOTICEABLE_SHARE) & open_
+    thin = stands & (surface.thin > NOTICEABLE_SHARE)
+    seen = open_ & (surface.two_sided > NOTICEABLE_SHARE)
+    found = []
+    movable = stands & ~thin
+    remedy = "move them behind it, or give both a common tag where the body is thin"
+    if movable.any():
+        problem = f"{_stand(movable)} in front of the surface {_worst(movable, share, depth)}"
+        found.append(Finding(SUBJECT, problem, remedy, kinds.IN_FRONT, _rows(np.flatnonzero(movable))))
+    remedy = "give them and their surface a common tag, or use more lights there"
+    if thin.any():
+        problem = f"{_stand(thin)} in front of a body that is too thin to hide behind {_worst(thin, share, depth)}"
+        found.append(Finding(SUBJECT, problem, remedy, kinds.THIN, _rows(np.flatnonzero(thin))))
+    if seen.any():
+        which = "1 light stands" if seen.sum() == 1 else f"{int(seen.sum())} lights stand"
+        problem = f"{which} for a sheet that is seen from behind, too (first: light {int(np.argmax(seen))})"
+        found.append(Finding(SUBJECT, problem, remedy, kinds.TWO_SIDED, _rows(np.flatnonzero(seen))))
+    return found
+
+
+def _stand(chosen: Bool) -> str:
+    return "1 light stands" if chosen.sum() == 1 else f"{int(chosen.sum())} lights stand"
+
+
+def _worst(chosen: Bool, share: Float64, depth: Float64) -> str:
+    first = int(np.argmax(chosen))
+    return f"(first: light {first}, {share[first]:.0%} of it; deepest {depth[chosen].max():.3g} m)"
+
+
+def _lost_tags(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> list[Finding]:
+    known: Int32 = np.unique(np.concatenate([mesh.tag_ids for mesh in meshes])) if meshes else np.zeros(0, np.int32)
+    linked = np.isin(light_mesh.tag_ids, light_mesh.links[np.isin(light_mesh.links[:, 1], known), 0])
+    lost = (light_mesh.tag_ids != 0) & ~np.isin(light_mesh.tag_ids, known) & ~linked
     found: list[Finding] = []
     if meshes:
-        problem = "a tag that no visible surface carries, so it has no effect"
-        _append(found, lost, light_mesh.tag_ids, problem, "tag the surface alike, or clear the tag")
+        problem, remedy = (
+            "a tag that no visible surface carries, so it has no effect",
+            "tag the surface alike, or clear it",
+        )
+        _append(found, lost, light_mesh.tag_ids, problem, remedy, kinds.LOST_TAG)
     return found

@@ -24,7 +24,7 @@ from .triangle_tree import TriangleTree, build_tree
 # Points of each region at which its own light is measured, first of all lights, then of those that may withdraw.
 ROUGH_POINTS, FINE_POINTS = 16, 48
 # Mean share of a light's radiosity that its own region may receive.
-ALLOWED = 2e-3
+ALLOWED = 5e-3
 # Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
 SHRINKS = (1.0, 0.7, 0.45, 0.25)
 DEPTHS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.6)
