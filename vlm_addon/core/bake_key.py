@@ -18,8 +18,9 @@ from .scene import Mesh
 
 DIGITS = 16
 """Of a hash: 64 bits tell a scene's surfaces apart."""
-LOOKS_ALONE = {"name", "corner_normals", "corner_uvs", "corner_colors", "material_indices"}
-"""Fields of Mesh that lights are not made from: what they mean is in `reflectance` and `emission`."""
+NOT_MADE_FROM = {"name", "corner_normals", "corner_uvs", "corner_colors", "material_indices", "tag_ids"}
+"""Fields of Mesh that lights are not made from: what looks mean is in `reflectance` and `emission`, and tags say which
+lights a surface leaves out when there are lights."""
 LIGHT_ALONE = {"colour", "emission", "strength", "samples"}
 """Fields of VirtualLightMesh that a light grid does not depend on."""
 NAMED = 3
@@ -53,7 +54,7 @@ def surface_hashes(meshes: Iterable[Mesh]) -> dict[str, str]:
     """Hash of each visible object, the instances of one instancer together, by name."""
     parts: dict[str, list[str]] = {}
     for mesh in meshes:
-        left_out = LOOKS_ALONE | {"positions"} if mesh.dynamic else LOOKS_ALONE
+        left_out = NOT_MADE_FROM | {"positions"} if mesh.dynamic else NOT_MADE_FROM
         parts.setdefault(mesh.name.split("/")[0], []).append(_hash(mesh, left_out))
     return {name: found[0] if len(found) == 1 else _short(found) for name, found in parts.items()}
 
