@@ -15,6 +15,7 @@ from .dynamics import is_dynamic
 from .materials import FindingList, MaterialTable, MaterialUse
 from .mesh_arrays import LocalMesh, flipped, place, read_mesh
 from .names import TAG_PROPERTY
+from .painted_detail import painted_detail
 from .surface_value import IDENTITY_UV
 from .triangle_averages import TextureAverager, triangle_averages
 
@@ -43,6 +44,7 @@ class MeshExtractor:
         self._override = depsgraph.view_layer.material_override
         self._averager = TextureAverager(materials.textures)
         self._local: dict[tuple[str, int], LocalMesh] = {}
+        self._detail: dict[tuple[str, int], Float32] = {}
         self._looks: dict[tuple[int, tuple[MaterialUse, ...]], _Look] = {}
         self._dynamic: dict[str, bool] = {}
 
@@ -59,11 +61,13 @@ class MeshExtractor:
         return [self._placed(instance, name, local, matrix)]
 
     def _read(self, blender_object: Any) -> LocalMesh:
-        key = (blender_object.name_full, blender_object.data.as_pointer())
+        key = _key(blender_object)
         if key not in self._local:
             mesh = blender_object.to_mesh()
             try:
-                self._local[key] = read_mesh(mesh, f"object {blender_object.name!r}")
+                local = read_mesh(mesh, f"object {blender_object.name!r}")
+                self._detail[key] = painted_detail(blender_object, mesh, local.triangles)
+                self._local[key] = local
             finally:
                 blender_object.to_mesh_clear()
         return self._local[key]
@@ -112,6 +116,7 @@ class MeshExtractor:
             reflectance=look.reflectance,
             emission=look.emission,
             dynamic=self._is_dynamic(instance),
+            detail=self._detail[_key(instance.object)],
         )
 
     def _look(self, local: LocalMesh, uses: tuple[MaterialUse, ...], name: str) -> _Look:
@@ -193,6 +198,10 @@ class MeshExtractor:
                 self._report(subject, f"{flag[3:].replace('_', ' ')} is not simulated", "it is an ordinary surface")
         if any(system.settings.type == "HAIR" for system in blender_object.particle_systems):
             self._report(subject, "hair strands are not simulated", "they are left out")
+
+
+def _key(blender_object: Any) -> tuple[str, int]:
+    return blender_object.name_full, blender_object.data.as_pointer()
 
 
 def _tags(instance: Any, local: LocalMesh) -> Int32:

@@ -21,6 +21,8 @@ ROUGH_LEAST = 4000
 # The factor falls to this where it would leave more than so many triangles, which take long and gain little.
 ROUGH_FACTOR_OF_MANY, ROUGH_MANY = 2.5, 40_000
 WORTHWHILE = 1.3
+# Detail from which triangles are reduced apart from the others.
+DETAILED = 1.5
 # Share of the budget that the least forms of all shells may take before the weakest shells are left out: to show small
 # things as tetrahedra costs the large things more than to give their power to neighbours.
 SHELL_SHARE = 0.25
@@ -53,13 +55,13 @@ def reduce_surface(
     if int(solid.sum()) <= target:
         return _selected(surface, solid)
     rows = np.flatnonzero(_strongest_shells(surface, solid, target))
-    weight = surface.importance() / np.where(surface.areas > 0, surface.areas, 1.0)
+    weight = surface.weight() / np.where(surface.areas > 0, surface.areas, 1.0)
     start = Reduced(surface.positions, surface.triangles[rows], np.arange(len(rows)), np.arange(len(surface.positions)))
     rough_target = int(min(ROUGH_FACTOR * target, max(ROUGH_FACTOR_OF_MANY * target, ROUGH_MANY)))
     if len(rows) > WORTHWHILE * max(rough_target, ROUGH_LEAST):
         power = (weight * surface.areas)[rows]
         start = reduce_groups(
-            surface.positions, surface.triangles[rows], surface.group[rows], power, max(rough_target, ROUGH_LEAST)
+            surface.positions, surface.triangles[rows], _alike(surface)[rows], power, max(rough_target, ROUGH_LEAST)
         )
     left = rows[start.source_triangle]
     used, triangles = np.unique(start.triangles, return_inverse=True)
@@ -83,6 +85,11 @@ def reduce_surface(
     )
 
 
+def _alike(surface: SourceSurface) -> Int64:
+    """(t,): groups, parted where more detail is asked for, so that the rough reduction spares it."""
+    return 2 * surface.group + (surface.detail > DETAILED)
+
+
 def _selected(surface: SourceSurface, chosen: Bool) -> ReducedSurface:
     rows = np.flatnonzero(chosen)
     used, triangles = np.unique(surface.triangles[rows], return_inverse=True)
@@ -94,7 +101,7 @@ def _selected(surface: SourceSurface, chosen: Bool) -> ReducedSurface:
 def _strongest_shells(surface: SourceSurface, solid: Bool, target: int) -> Bool:
     """(t,): triangles of the strongest shells, as many as the budget has room for."""
     count = len(surface.closed)
-    power = np.bincount(surface.shell, weights=surface.importance(), minlength=count)
+    power = np.bincount(surface.shell, weights=surface.weight(), minlength=count)
     size = np.bincount(surface.shell[solid], minlength=count)
     least = np.minimum(size, np.where(surface.closed, LEAST_CLOSED, LEAST_OPEN))
     order = np.argsort(np.where(size > 0, -power, np.inf), kind="stable")
@@ -113,7 +120,7 @@ def _within_budget(collapsed: CollapsedMesh, surface: SourceSurface, left: Int64
     """
     shell = surface.shell[left[collapsed.source_triangle]]
     solid = _areas(collapsed.positions, collapsed.triangles) > LEAST_AREA
-    power = np.bincount(surface.shell, weights=surface.importance())
+    power = np.bincount(surface.shell, weights=surface.weight())
     size = np.bincount(shell[solid], minlength=len(power))
     order = np.argsort(-power, kind="stable")
     kept = np.zeros(len(power), bool)

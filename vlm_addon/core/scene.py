@@ -83,6 +83,8 @@ class Mesh:
     float32 linear, or (0, 3, 3) where no material reads them. material_indices: (t,) int32 into
     SceneSnapshot.materials. tag_ids: (t,) int32, UNTAGGED where none. reflectance: (t, 3) float32, diffuse
     reflectance averaged over the triangle. emission: (t, 3) float32, radiant exitance in W/m², averaged likewise.
+    detail: (t,) float32, about how many times as many virtual lights as elsewhere a surface of this shape gets, 0 for
+    none; (0,) where nothing is asked for.
     """
 
     name: str
@@ -96,13 +98,15 @@ class Mesh:
     reflectance: Float32
     emission: Float32
     dynamic: bool = False
+    detail: Float32 = field(default_factory=lambda: np.zeros(0, np.float32), repr=False)
 
     def subset(self, chosen: npt.NDArray[np.bool_]) -> Mesh:
         """The mesh with the triangles of `chosen`, (t,) bool, and all vertices."""
         names = ("triangles", "corner_normals", "corner_uvs", "material_indices", "tag_ids", "reflectance", "emission")
         rows = {name: getattr(self, name)[chosen] for name in names}
         colors = self.corner_colors[chosen] if len(self.corner_colors) else self.corner_colors
-        return replace(self, corner_colors=colors, **rows)
+        detail = self.detail[chosen] if len(self.detail) else self.detail
+        return replace(self, corner_colors=colors, detail=detail, **rows)
 
     def bounds(self) -> tuple[Float64, Float64]:
         """Lower and upper corner, (3,) float64 each, of its vertices, of which there is at least one."""

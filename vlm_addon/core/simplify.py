@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import InvalidInput
-from .light_mesh import VirtualLightMesh, empty_light_mesh
+from .kept_lights import kept_regions
+from .light_mesh import VirtualLightMesh, empty_light_mesh, join
 from .mesh_topology import Bool, Int64, Rows, closed_shells, rows_by_key, sum_by
 from .placement import Placement, place_behind, share_in_front
 from .progress import Progress, silent, step
@@ -23,7 +24,7 @@ from .regions import Regions, assign_regions
 from .sampling import sample_counts, sample_regions
 from .scene import Finding, Float64, Int32, Mesh
 from .settings import setting
-from .source_surface import SourceSurface, join_surface
+from .source_surface import SourceSurface, join_surface, part_of
 from .subdivide import subdivide_light_mesh
 from .withdrawal import withdraw
 
@@ -61,7 +62,8 @@ class SimplifyReport:
     """What was done. milliseconds: (step, ms) in order. Powers: (3,) m² under unit irradiance (reflected) or W
     (emitted), linear Rec.709. share_in_front: share of the source area that lies behind the plane of its own light.
     shells_dropped: shells too weak for the budget, whose power neighbours took over. limited_lights: lights that a
-    thin body kept in front of their surface."""
+    thin body kept in front of their surface. unlit_area: m² of the surface painted to have no lights, which is in none
+    of the powers. kept_lights: lights that were there and stay; powers are of the others and their surface."""
 
     source_triangles: int
     degenerate_triangles: int
@@ -77,13 +79,15 @@ class SimplifyReport:
     closed_shells_after: int
     share_in_front: float
     limited_lights: int
+    unlit_area: float
+    kept_lights: int
     findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
 class CreatedLightMesh:
     """light_of_triangle: for each mesh given, (its triangles,) int32, the light whose region holds each triangle, -1
-    for a triangle that welds to a line."""
+    for a triangle that welds to a line or is to have no light. Lights that were kept come first."""
 
     light_mesh: VirtualLightMesh
     light_of_triangle: tuple[Int32, ...]
@@ -113,14 +117,18 @@ class _Clock:
 
 
 def create_light_mesh(
-    meshes: Sequence[Mesh], settings: SimplifySettings = SimplifySettings(), progress: Progress = silent
+    meshes: Sequence[Mesh],
+    settings: SimplifySettings = SimplifySettings(),
+    progress: Progress = silent,
+    keep: VirtualLightMesh | None = None,
 ) -> CreatedLightMesh:
     """Virtual lights that stand for the surface of `meshes`, at most settings.target_triangles of them.
 
     Reflected and emitted power are those of the source. Borders between materials, tags and meshes survive, closed
     shells stay closed, and every source triangle belongs to the region of exactly one light. Without any surface the
-    light mesh is empty and a finding says so. Raises InvalidInput for a target below 1 or values that are not finite
-    (naming the mesh), and Cancelled.
+    light mesh is empty and a finding says so. keep: lights that stay as they are, bit for bit, and count; the surface
+    that they stand for gets no others. Raises InvalidInput for a target below 1, fewer lights than are kept, or values
+    that are not finite (naming the mesh), and Cancelled.
     """
     if settings.target_triangles < 1 or settings.samples_per_light < 1:
         problem = f"{settings.target_triangles} lights with {settings.samples_per_light} samples"
@@ -128,13 +136,19 @@ def create_light_mesh(
     clock = _Clock(progress)
     clock.start(0.0, "weld")
     surface = join_surface(meshes)
+    whole, kept = surface, keep if keep is not None else empty_light_mesh()
+    held = kept_regions(kept, surface.corners, surface.normals)
+    if len(kept):
+        surface = part_of(surface, held < 0)
+    target = settings.target_triangles - len(kept)
+    if target < 1 and len(surface.triangles):
+        problem = f"{len(kept)} locked lights leave none of {settings.target_triangles} for the rest of the surface"
+        raise InvalidInput("simplification", problem, "ask for more lights or unlock some")
     clock.start(0.1, "simplify")
-    lights = reduce_surface(
-        surface, settings.target_triangles, lambda share: step(progress, 0.1 + 0.5 * share, "simplify")
-    )
+    lights = reduce_surface(surface, target, lambda share: step(progress, 0.1 + 0.5 * share, "simplify"))
     if not len(lights.triangles):
         clock.stop()
-        return _nothing(meshes, surface, clock)
+        return _nothing(meshes, whole, kept, held, clock)
     clock.start(0.6, "regions")
     regions = assign_regions(surface, lights)
     clock.start(0.7, "place")
@@ -149,12 +163,21 @@ def create_light_mesh(
     in_front = share_in_front(light_mesh.corners, own, surface.corners)
     clock.stop()
     report = _report(surface, lights, light_mesh, regions, placement, in_front, clock)
+    report = replace(report, kept_lights=len(kept))
     step(progress, 1.0, "done")
-    return CreatedLightMesh(light_mesh, _by_mesh(meshes, surface, regions.light), report)
+    of_triangle = held.copy()
+    of_triangle[held < 0] = regions.light + len(kept)
+    both = join([kept, light_mesh]) if len(kept) else light_mesh
+    return CreatedLightMesh(both, _by_mesh(meshes, whole, of_triangle), report)
 
 
-def _nothing(meshes: Sequence[Mesh], surface: SourceSurface, clock: _Clock) -> CreatedLightMesh:
-    finding = Finding("scene", "no surface with any area was given", "add a mesh with faces")
+def _nothing(
+    meshes: Sequence[Mesh], surface: SourceSurface, kept: VirtualLightMesh, held: Int64, clock: _Clock
+) -> CreatedLightMesh:
+    """The lights that are kept alone."""
+    findings = _unlit(surface.unlit_area)
+    if not len(kept) and not findings:
+        findings = (Finding("scene", "no surface with any area was given", "add a mesh with faces"),)
     zero = (0.0, 0.0, 0.0)
     report = SimplifyReport(
         source_triangles=surface.triangle_count,
@@ -171,10 +194,11 @@ def _nothing(meshes: Sequence[Mesh], surface: SourceSurface, clock: _Clock) -> C
         closed_shells_after=0,
         share_in_front=0.0,
         limited_lights=0,
-        findings=(finding,),
+        unlit_area=surface.unlit_area,
+        kept_lights=len(kept),
+        findings=findings,
     )
-    none = tuple(np.full(len(mesh.triangles), -1, np.int32) for mesh in meshes)
-    return CreatedLightMesh(empty_light_mesh(), none, report)
+    return CreatedLightMesh(kept, _by_mesh(meshes, surface, held), report)
 
 
 def _region_rows(regions: Regions, chosen: Bool, light_count: int) -> Rows:
@@ -265,6 +289,8 @@ def _report(
         closed_shells_after=still_closed,
         share_in_front=in_front,
         limited_lights=int(placement.limited.sum()),
+        unlit_area=surface.unlit_area,
+        kept_lights=0,
         findings=(),
     )
     return replace(report, findings=_findings(report, lights, placement))
@@ -275,7 +301,7 @@ def _triple(values: Float64) -> tuple[float, float, float]:
 
 
 def _findings(report: SimplifyReport, lights: ReducedSurface, placement: Placement) -> tuple[Finding, ...]:
-    found = []
+    found = list(_unlit(report.unlit_area))
     if report.shells_dropped:
         problem = f"{report.shells_dropped} of {report.shells} separate pieces got no light of their own"
         found.append(Finding("light mesh", problem, "their power went to lights nearby; ask for more lights"))
@@ -293,3 +319,11 @@ def _findings(report: SimplifyReport, lights: ReducedSurface, placement: Placeme
         )
         found.append(Finding("light mesh", problem, "give these parts and their lights a common tag, or more lights"))
     return tuple(found)
+
+
+def _unlit(area: float) -> tuple[Finding, ...]:
+    """What is to be known of surfaces that are painted to have no lights."""
+    if not area > 0.0:
+        return ()
+    problem = f"{area:.3g} m² are painted to have no lights"
+    return (Finding("light mesh", problem, "nothing bounces off them; paint less of the vertex group to change that"),)
