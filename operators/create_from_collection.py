@@ -22,6 +22,7 @@ class VLM_OT_create_from_collection(LongOperator, Operator):  # noqa: N801 (Blen
             name="Collection", description="Name of the collection; the active one where it is empty"
         ),
         **property_annotations(BakeSettings),
+        **authoring.TAG_REGIONS,
     }
 
     @classmethod
@@ -32,7 +33,8 @@ class VLM_OT_create_from_collection(LongOperator, Operator):  # noqa: N801 (Blen
         collection = bpy.data.collections.get(self.collection) if self.collection else context.collection
         if collection is None:
             raise InvalidInput(f"collection {self.collection!r}", "there is none of that name", "name one of this file")
-        return authoring.from_collection(collection, settings_from(self, BakeSettings))
+        settings = settings_from(self, BakeSettings)
+        return authoring.from_collection(collection, settings, self.tag_regions)
 
     def finish(self, context, result):
         self.report({"INFO"}, authoring.write(result))

@@ -15,14 +15,14 @@ class VLM_OT_create_from_scene(LongOperator, Operator):  # noqa: N801 (Blender's
     bl_idname = "vlm.create_from_scene"
     bl_label = "Create from Scene"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
-    __annotations__ = property_annotations(BakeSettings)
+    __annotations__ = {**property_annotations(BakeSettings), **authoring.TAG_REGIONS}
 
     @classmethod
     def poll(cls, context):
         return authoring.allow(cls, availability.visible_scene_problem(context))
 
     def prepare(self, context):
-        return authoring.from_scene(context, settings_from(self, BakeSettings))
+        return authoring.from_scene(context, settings_from(self, BakeSettings), self.tag_regions)
 
     def finish(self, context, result):
         self.report({"INFO"}, authoring.write(result))

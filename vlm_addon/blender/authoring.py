@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -14,7 +14,9 @@ from ..core.bake_key import surface_hashes
 from ..core.errors import InvalidInput, VlmError
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
+from ..core.tag_pairs import without_automatic
 from ..light_grid_bake import check_lights
+from . import animation
 from .availability import has_geometry, light_mesh_objects, rendered_objects
 from .bake_state import set_made_from
 from .engine import ENGINE_ID
@@ -22,10 +24,20 @@ from .extract import ExtractOptions, extract_scene, require_camera, require_ligh
 from .findings import list_findings
 from .light_grid_options import scene_grid_settings
 from .light_mesh_io import Extraction, LightOrigins, extract, origins_of
-from .names import SOURCES_PROPERTY
+from .names import NAME, SOURCES_PROPERTY
+from .source_faces import SourceFaces, read_source_faces
+from .source_tags import faces_to_tag, require_unchanged, write_face_tags
 from .write_back import write_light_mesh
 
-NAME = "VLM"
+TAG_REGIONS = {
+    "tag_regions": bpy.props.BoolProperty(
+        name="Tag Regions",
+        description="Let every face leave out just the lights that stand for it, by tags: no light on its own region "
+        "at all, for some more time and memory in each picture",
+        default=False,
+    )
+}
+"""The property of operators that make light meshes of objects."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +45,7 @@ class Made:
     """A bake and where it goes: the scene's name, the light mesh's name and the objects that it was made from.
 
     name is None where the scene keeps the light meshes that it has, which are at `origins`. made_from: hashes of the
-    surfaces, so that it can be told later whether they have changed.
+    surfaces, so that it can be told later whether they have changed. tagged: where new tags of them go, None without.
     """
 
     bake: Bake
@@ -42,17 +54,18 @@ class Made:
     sources: tuple[str, ...] = ()
     origins: LightOrigins | None = None
     made_from: Mapping[str, str] = field(default_factory=dict)
+    tagged: SourceFaces | None = None
 
 
-def from_selection(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
-    """Work that makes a light mesh of the selected objects."""
+def from_selection(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
+    """Work that makes a light mesh of the selected objects. tag_regions: as for `_from_objects`."""
     things = [thing for thing in context.selected_objects if has_geometry(thing)]
     active = context.active_object
     named_after = active if active in things else things[0]
-    return _from_objects(things, f"{NAME} {named_after.name}", settings)
+    return _from_objects(things, f"{NAME} {named_after.name}", settings, tag_regions)
 
 
-def from_collection(collection: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
+def from_collection(collection: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the objects of a collection and of those in it.
 
     Raises InvalidInput where none of them shows a surface in renders.
@@ -61,17 +74,25 @@ def from_collection(collection: Any, settings: BakeSettings) -> Callable[[Progre
     if not things:
         problem = "none of its objects shows a surface in renders"
         raise InvalidInput(f"collection {collection.name!r}", problem, "put meshes into it, or choose another")
-    return _from_objects(things, f"{NAME} {collection.name}", settings)
+    return _from_objects(things, f"{NAME} {collection.name}", settings, tag_regions)
 
 
-def from_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
+def from_scene(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
     """Work that makes one light mesh of all that the scene shows, whatever light meshes it has."""
-    return _from_objects([thing for thing in rendered_objects(context) if has_geometry(thing)], NAME, settings)
+    things = [thing for thing in rendered_objects(context) if has_geometry(thing)]
+    return _from_objects(things, NAME, settings, tag_regions)
 
 
-def _from_objects(things: list[Any], name: str, settings: BakeSettings) -> Callable[[Progress], Made]:
+def _from_objects(
+    things: list[Any], name: str, settings: BakeSettings, tag_regions: bool
+) -> Callable[[Progress], Made]:
+    """tag_regions: let each face leave out just the lights that stand for it, as the simplification knows them."""
     sources = tuple(thing.name for thing in things)
-    return _work(extract_scene(ExtractOptions(objects=frozenset(sources))), name, sources, settings)
+    options = ExtractOptions(objects=frozenset(sources))
+    if not tag_regions:
+        return _work(extract_scene(options), name, sources, settings)
+    tagged = read_source_faces(options)
+    return _work(tagged.snapshot, name, sources, settings, tagged)
 
 
 def from_visible_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
@@ -96,11 +117,18 @@ def _work_on_scene(context: Any, found: Extraction, settings: BakeSettings) -> C
 
 
 def _work(
-    snapshot: SceneSnapshot, name: str, sources: tuple[str, ...], settings: BakeSettings
+    snapshot: SceneSnapshot,
+    name: str,
+    sources: tuple[str, ...],
+    settings: BakeSettings,
+    tagged: SourceFaces | None = None,
 ) -> Callable[[Progress], Made]:
+    faces = faces_to_tag(tagged) if tagged is not None else None
+    plain = replace(snapshot, meshes=tuple(map(without_automatic, snapshot.meshes)))
+
     def work(progress: Progress) -> Made:
-        made = bake(snapshot, None, settings, progress)
-        return Made(made, snapshot.name, name, sources, made_from=surface_hashes(snapshot.meshes))
+        made = bake(plain, None, settings, progress, faces)
+        return Made(made, snapshot.name, name, sources, made_from=surface_hashes(plain.meshes), tagged=tagged)
 
     return work
 
@@ -113,11 +141,17 @@ def write(made: Made) -> str:
     if made.name is None or made.bake.creation is None:
         list_findings(scene, findings, made.origins)
         return f"Kept the {count} that the scene has"
+    if made.tagged is not None and made.bake.face_tags is not None:
+        require_unchanged(made.tagged, made.bake.face_tags)
+    followed = animation.followed_by(made.name, scene)
     written = write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
+    if made.tagged is not None and made.bake.face_tags is not None:
+        write_face_tags(made.tagged, made.bake.face_tags)
     set_made_from(written, made.made_from)
     list_findings(scene, findings, origins_of(written))
     seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
-    return f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s"
+    again = animation.follow_again(written, followed, bpy.context)
+    return f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s{again}"
 
 
 def _counted_twice(scene: Any, made: Made) -> list[Finding]:
@@ -147,7 +181,7 @@ def check(context: Any) -> Callable[[Progress], Checked]:
     found = extract_edited(context)
     settings = scene_grid_settings(context.scene)
     budget = over_budget(context.scene, len(found.light_mesh or ()))
-    notes = (*budget, *found.snapshot.findings)
+    notes = (*budget, *animation.left_behind(context.scene), *found.snapshot.findings)
 
     def work(progress: Progress) -> Checked:
         findings = check_lights(found.snapshot, found.light_mesh, settings, progress)
