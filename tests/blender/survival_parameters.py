@@ -23,7 +23,7 @@ def _finding(random):
 
 
 OWN = {
-    "add_preset": lambda random: {"name": f"preset {random.randint(1, 3)}"},
+    "add_preset": lambda random: {"name": f"preset {random.getrandbits(32)}"},
     "select_offenders": _finding,
     **STROKES,
 }
