@@ -14,6 +14,7 @@ from .draw_lights import light_count
 from .draw_mesh import rings_of, vertices_world
 from .draw_modal import ModalStroke, in_surface, near_in_view
 from .draw_points import text_of
+from .draw_preview import ERASE_COLOR
 from .draw_shapes import rectangle, simplified, strip, way_in_steps
 from .draw_snap import Place, nearest_edge
 from .drawn_faces import plane_of
@@ -158,6 +159,7 @@ class EraseGesture(ModalStroke):
     """A drag over lights, or a click on one."""
 
     title = "Erase lights"
+    color = ERASE_COLOR
     is_freehand = True
     ends_on_click = True
     radius: float

@@ -37,8 +37,11 @@ PASSED = (
 )
 """What goes on working while a stroke is drawn: beginnings of operators' names, by keymap."""
 
-TIMERS = ("TIMER", "WINDOW_DEACTIVATE", "NDOF_MOTION", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM")
+BLENDERS = ("TIMER", "WINDOW_DEACTIVATE", "NDOF_MOTION", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM")
 """Events without a key that are Blender's."""
+
+WHEEL = {"WHEELINMOUSE": ("WHEELUPMOUSE", "WHEELDOWNMOUSE"), "WHEELOUTMOUSE": ("WHEELUPMOUSE", "WHEELDOWNMOUSE")}
+"""Keymaps say in and out, events up and down; which is which is a preference."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class _Key:
 
     def is_pressed(self, event: Any) -> bool:
         alike = (event.shift, event.ctrl, event.alt, event.oskey) == (self.shift, self.ctrl, self.alt, self.oskey)
-        return bool(event.type == self.type and (self.any or alike))
+        return event.type in WHEEL.get(self.type, (self.type,)) and (self.any or alike)
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class Keys:
 
     def is_passed(self, event: Any) -> bool:
         """Whether the event is one that Blender shall have: navigation and saving."""
-        return event.type in TIMERS or any(key.is_pressed(event) for key in self.passed)
+        return event.type in BLENDERS or any(key.is_pressed(event) for key in self.passed)
 
 
 def read_keys(context: Any) -> Keys:
@@ -82,7 +85,8 @@ def read_keys(context: Any) -> Keys:
     actions = [(_key(item), action) for item, action in own]
     actions += [(_key(item), REMOVE) for item in _items(keymaps, UNDO[0], UNDO[1:])]
     texts: dict[str, str] = {}
-    for item, action in own:
+    # Blender lists what was added last first.
+    for item, action in reversed(own):
         texts.setdefault(action, item.to_string())
     passed = [_key(item) for name, starts in PASSED for item in _items(keymaps, name, starts)]
     return Keys(tuple(actions), tuple(passed), texts)

@@ -7,19 +7,17 @@ are averaged over just what the piece covers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 
 from ..core.scene import UNTAGGED, Float32, Float64
-from .color_space import working_to_rec709
 from .draw_surfaces import SurfaceHit
-from .materials import FindingList, MaterialTable
+from .kept_materials import forget_large, material_reader
 from .mesh_arrays import LocalMesh, read_attribute
-from .mesh_extraction import MeshExtractor
 from .names import TAG_ATTRIBUTE, TAG_PROPERTY
 
 ON_TRIANGLE = 1e-3
@@ -35,17 +33,61 @@ class Looks:
     tags: np.ndarray
 
 
+class _Slot(NamedTuple):
+    """As much of a material slot as is read."""
+
+    material: Any
+
+
+class _Owner(NamedTuple):
+    """As much of an object as decides the looks of its mesh: Blender's own are gone when it has gone through its
+    instances."""
+
+    name: str
+    material_slots: tuple[_Slot, ...]
+
+
+class _Surface:
+    """An evaluated mesh with the materials that it shows."""
+
+    def __init__(self, thing: Any, mesh: Any) -> None:
+        self.owner = _Owner(thing.name, tuple(_Slot(slot.material) for slot in thing.material_slots))
+        self.mesh = mesh
+        self._triangles: dict[int, list[tuple[list[int], list[int], Float64]]] = {}
+        if mesh is not None:
+            mesh.calc_loop_triangles()
+
+    def triangles(self, face: int) -> list[tuple[list[int], list[int], Float64]]:
+        """Vertices, loops and (3, 3) local corners of the triangles of a face; none where there is no such face."""
+        if face not in self._triangles:
+            self._triangles[face] = self._read(face)
+        return self._triangles[face]
+
+    def _read(self, face: int) -> list[tuple[list[int], list[int], Float64]]:
+        if self.mesh is None or face >= len(self.mesh.polygons):
+            return []
+        polygon = self.mesh.polygons[face]
+        # Triangles follow each other in order of faces, two fewer than each face has corners.
+        first = polygon.loop_start - 2 * face
+        found = []
+        for number in range(first, first + polygon.loop_total - 2):
+            triangle = self.mesh.loop_triangles[number]
+            vertices = list(triangle.vertices)
+            corners = np.array([self.mesh.vertices[vertex].co for vertex in vertices], np.float64)
+            found.append((vertices, list(triangle.loops), corners))
+        return found
+
+
 @dataclass(frozen=True)
 class _Under:
-    """The triangle under a piece: corners of its mesh (3,), weights of them at the piece's corners (3, 3)."""
+    """The triangle under a piece: its corners in the mesh, and (3, 3) their weights at the piece's corners."""
 
-    thing: Any
-    mesh: Any
+    surface: _Surface
+    face: int
     vertices: list[int]
     loops: list[int]
     weights: Float64
-    face: int
-    owner: Any
+    object_tag: int
 
 
 def looks_under(pieces: Float64, hits: Sequence[SurfaceHit | None], depsgraph: Any) -> Looks:
@@ -57,13 +99,13 @@ def looks_under(pieces: Float64, hits: Sequence[SurfaceHit | None], depsgraph: A
     reflectance, emission = np.zeros((2, len(pieces), 3), np.float32)
     tags = np.full(len(pieces), UNTAGGED, np.int32)
     try:
-        by_object: dict[int, list[tuple[int, _Under]]] = {}
+        by_surface: dict[int, list[tuple[int, _Under]]] = {}
         for row, hit in enumerate(hits):
             under = None if hit is None else reader.triangle(hit, pieces[row])
             if under is not None:
-                tags[row] = reader.tag(under)
-                by_object.setdefault(id(under.mesh), []).append((row, under))
-        for found in by_object.values():
+                tags[row] = _tag(under)
+                by_surface.setdefault(id(under.surface), []).append((row, under))
+        for found in by_surface.values():
             rows = [row for row, _ in found]
             reflectance[rows], emission[rows] = reader.averages([under for _, under in found])
     finally:
@@ -76,15 +118,15 @@ class _Reader:
 
     def __init__(self, depsgraph: Any) -> None:
         self._depsgraph = depsgraph
-        to_rec709 = working_to_rec709()
-        report = FindingList()
-        self._extractor = MeshExtractor(MaterialTable(to_rec709, report), to_rec709, report, depsgraph)
-        self._meshes: dict[tuple[str, str | None], tuple[Any, Any]] = {}
+        self._extractor = material_reader(depsgraph)
+        self._surfaces: dict[tuple[str, str | None], _Surface] = {}
+        self._instances: dict[tuple[tuple[str, str | None], bytes], list[_Surface]] = {}
         self._temporary: list[Any] = []
 
     def close(self) -> None:
         for thing in self._temporary:
             thing.to_mesh_clear()
+        forget_large()
 
     def triangle(self, hit: SurfaceHit, piece: Float64) -> _Under | None:
         """The triangle that was hit. Blender names the owner of instances that geometry nodes make, not what is
@@ -92,51 +134,38 @@ class _Reader:
         original = bpy.data.objects.get(hit.key)
         if original is None:
             return None
-        if hit.key not in self._meshes:
-            self._meshes[hit.key] = self._own_mesh(original)
-        thing, mesh = self._meshes[hit.key]
-        found = _under(thing, mesh, original, hit, piece)
+        tag = int(original.get(TAG_PROPERTY, UNTAGGED))
+        if hit.key not in self._surfaces:
+            self._surfaces[hit.key] = self._own(original)
+        found = _under(self._surfaces[hit.key], tag, hit, piece)
         if found is not None:
             return found
-        for thing, mesh in self._instanced(original, hit):
-            found = _under(thing, mesh, original, hit, piece)
-            if found is not None:
-                return found
-        return None
+        place = (hit.key, hit.matrix.tobytes())
+        if place not in self._instances:
+            self._instances[place] = self._instanced(original, hit)
+        return next(filter(None, (_under(surface, tag, hit, piece) for surface in self._instances[place])), None)
 
-    def _own_mesh(self, original: Any) -> tuple[Any, Any]:
+    def _own(self, original: Any) -> _Surface:
         thing = original.evaluated_get(self._depsgraph)
         if thing.type == "MESH" and original.mode != "EDIT":
-            mesh = thing.data
-        else:
-            mesh = thing.to_mesh()
-            self._temporary.append(thing)
-        if mesh is not None:
-            mesh.calc_loop_triangles()
-        return thing, mesh
+            return _Surface(thing, thing.data)
+        self._temporary.append(thing)
+        return _Surface(thing, thing.to_mesh())
 
-    def _instanced(self, original: Any, hit: SurfaceHit) -> Iterator[tuple[Any, Any]]:
+    def _instanced(self, original: Any, hit: SurfaceHit) -> list[_Surface]:
+        found = []
         for instance in self._depsgraph.object_instances:
             parent = instance.parent
             if not instance.is_instance or parent is None or parent.original != original:
                 continue
             if instance.object.type == "MESH" and np.allclose(np.array(instance.matrix_world), hit.matrix, atol=1e-5):
-                mesh = instance.object.data
-                mesh.calc_loop_triangles()
-                yield instance.object, mesh
-
-    def tag(self, under: _Under) -> int:
-        """Tag of the face where it has one, else of the object."""
-        attribute = under.mesh.attributes.get(TAG_ATTRIBUTE)
-        if attribute is not None and attribute.domain == "FACE" and attribute.data_type == "INT":
-            value = int(attribute.data[under.face].value)
-            if value != UNTAGGED:
-                return value
-        return int(under.owner.get(TAG_PROPERTY, UNTAGGED))
+                found.append(_Surface(instance.object, instance.object.data))
+        return found
 
     def averages(self, found: list[_Under]) -> tuple[Float32, Float32]:
         """Reflectance and emission of pieces over one mesh."""
-        thing, mesh = found[0].thing, found[0].mesh
+        surface = found[0].surface
+        mesh = surface.mesh
         count = len(found)
         local = LocalMesh(
             positions=np.zeros((0, 3), np.float32),
@@ -149,26 +178,26 @@ class _Reader:
             material_slots=np.array([mesh.polygons[under.face].material_index for under in found], np.int32),
             face_tags=np.zeros(count, np.int32),
         )
-        return self._extractor.averages(thing, local)
+        return self._extractor.averages(surface.owner, local)
 
 
-def _under(thing: Any, mesh: Any, owner: Any, hit: SurfaceHit, piece: Float64) -> _Under | None:
+def _tag(under: _Under) -> int:
+    """Tag of the face where it has one, else of the object."""
+    attribute = under.surface.mesh.attributes.get(TAG_ATTRIBUTE)
+    if attribute is not None and attribute.domain == "FACE" and attribute.data_type == "INT":
+        return int(attribute.data[under.face].value) or under.object_tag
+    return under.object_tag
+
+
+def _under(surface: _Surface, tag: int, hit: SurfaceHit, piece: Float64) -> _Under | None:
     """The triangle of face `hit.face` that holds the hit, or None where the face is elsewhere."""
-    if mesh is None or hit.face >= len(mesh.polygons):
-        return None
-    polygon = mesh.polygons[hit.face]
-    # Triangles follow each other in order of faces, two fewer than each face has corners.
-    first = polygon.loop_start - 2 * hit.face
     best, least = None, ON_TRIANGLE
-    for number in range(first, first + polygon.loop_total - 2):
-        triangle = mesh.loop_triangles[number]
-        vertices, loops = list(triangle.vertices), list(triangle.loops)
-        corners = np.array([mesh.vertices[vertex].co for vertex in vertices], np.float64)
-        corners = corners @ hit.matrix[:3, :3].T + hit.matrix[:3, 3]
+    for vertices, loops, local in surface.triangles(hit.face):
+        corners = local @ hit.matrix[:3, :3].T + hit.matrix[:3, 3]
         weights, off = _weights(corners, hit.location[None])
         outside = max(-float(weights.min()), off)
         if outside < least:
-            best = _Under(thing, mesh, vertices, loops, _weights(corners, piece)[0], hit.face, owner)
+            best = _Under(surface, hit.face, vertices, loops, _weights(corners, piece)[0], tag)
             least = outside
     return best
 
@@ -176,16 +205,16 @@ def _under(thing: Any, mesh: Any, owner: Any, hit: SurfaceHit, piece: Float64) -
 def _weights(corners: Float64, points: Float64) -> tuple[Float64, float]:
     """(p, 3) barycentric weights of points projected onto a triangle's plane, and how far the first lies off it as a
     share of the triangle's size."""
-    along, across = corners[1] - corners[0], corners[2] - corners[0]
-    normal = np.cross(along, across)
-    squared = float(normal @ normal)
-    if squared == 0.0:
+    along, across, offsets = corners[1] - corners[0], corners[2] - corners[0], points - corners[0]
+    a, b, c = float(along @ along), float(along @ across), float(across @ across)
+    squared = a * c - b * b
+    if not squared > 0.0:
         return np.full((len(points), 3), -np.inf), np.inf
-    offsets = points - corners[0]
-    second = np.cross(offsets, across) @ normal / squared
-    third = np.cross(along, offsets) @ normal / squared
-    off = abs(float(offsets[0] @ normal)) / squared**0.75
-    return np.column_stack([1.0 - second - third, second, third]), off
+    d, e = offsets @ along, offsets @ across
+    second, third = (c * d - b * e) / squared, (a * e - b * d) / squared
+    beside = offsets[0] - second[0] * along - third[0] * across
+    off = float(beside @ beside) ** 0.5 / squared**0.25
+    return np.stack([1.0 - second - third, second, third], axis=1), off
 
 
 def _continued(found: list[_Under], corners: list[Float64]) -> Float32:

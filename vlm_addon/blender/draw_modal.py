@@ -13,12 +13,14 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..core.brdf import albedo_table
 from ..core.scene import Float64
 from . import draw_preview
+from .background_work import BackgroundWork
 from .draw_keys import CANCEL, FINISH, REMOVE, SNAP, Keys, read_keys
 from .draw_mesh import vertices_world
 from .draw_points import text_of
-from .draw_preview import Preview
+from .draw_preview import DRAW_COLOR, Preview
 from .draw_snap import SNAP_PIXELS, Place, place_under
 from .draw_view import view_under
 from .names import is_light_mesh
@@ -43,6 +45,7 @@ class ModalStroke:
     report: Callable[[set[str], str], None]
     execute: Callable[[Any], set[str]]
     title = ""
+    color = DRAW_COLOR
     least_points = 1
     most_points = 0
     """The stroke ends with so many points; 0 for any number."""
@@ -78,6 +81,8 @@ class ModalStroke:
             return self.execute(context)
         self._places: list[Place] = []
         self._over: Place | None = None
+        # A table that all glossy materials share takes most of a second; the stroke takes longer.
+        self._warming = BackgroundWork(lambda _: albedo_table())
         self._keys: Keys = read_keys(context)
         self._held = False
         self._dragged = False
@@ -87,7 +92,7 @@ class ModalStroke:
         active = context.active_object
         own = active is not None and active.type == "MESH" and is_light_mesh(active)
         self._vertices = vertices_world(active) if own else np.zeros((0, 3))
-        self._preview = Preview()
+        self._preview = Preview(color=self.color)
         self._handle = draw_preview.show(self._preview)
         if self.modal(context, event) == CANCELLED:
             return CANCELLED

@@ -18,10 +18,9 @@ from ..core.scene import Float64
 from .draw_surfaces import SurfaceHit, hits_along, surface_under
 from .drawn_faces import Faces, triangles_of
 
-FINE_SIDE = 4
+SIDES = ((6, 4), (24, 3))
+"""Up to so many triangles are cut into so many pieces a side, more of them into COARSE_SIDE."""
 COARSE_SIDE = 2
-FINE_TRIANGLES = 24
-"""Triangles are cut into so many pieces a side: FINE_SIDE up to FINE_TRIANGLES of them, else COARSE_SIDE."""
 
 REACH_SHARE = 0.7
 """How far over or under a face its surface is looked for, as a share of the face's size (square root of its area)."""
@@ -64,7 +63,7 @@ class Placed:
 def pieces_of(faces: Faces, scene: Any, depsgraph: Any, sign: float = 1.0) -> Pieces:
     """The pieces of faces with the surface under them; sign: -1 for surfaces that face the other way."""
     triangles, owners = triangles_of(faces)
-    side = FINE_SIDE if len(triangles) <= FINE_TRIANGLES else COARSE_SIDE
+    side = next((side for most, side in SIDES if len(triangles) <= most), COARSE_SIDE)
     nodes, cells = _grid(side)
     corners, ground, hits, areas = [], [], [], []
     for triangle in triangles:

@@ -13,7 +13,8 @@ import numpy as np
 from ..core.scene import Float64
 
 LINE_PIXELS = 2.0
-COLOR = (1.0, 0.55, 0.1, 1.0)
+DRAW_COLOR = (1.0, 0.55, 0.1, 1.0)
+ERASE_COLOR = (1.0, 0.1, 0.1, 1.0)
 SNAPPED_COLOR = (0.2, 1.0, 0.4, 1.0)
 
 _HANDLES: list[Any] = []
@@ -22,10 +23,12 @@ _HANDLES: list[Any] = []
 
 @dataclass
 class Preview:
-    """lines: world-space ways (n, 3) each. mark: a way drawn where the point was snapped to something."""
+    """lines: world-space ways (n, 3) each. mark: a way drawn where the point was snapped to something. color: of the
+    lines, rgba."""
 
     lines: list[Float64] = field(default_factory=list)
     mark: list[Float64] = field(default_factory=list)
+    color: tuple[float, float, float, float] = DRAW_COLOR
 
 
 def show(preview: Preview) -> Any:
@@ -57,7 +60,7 @@ def _draw(preview: Preview) -> None:
 
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("ALPHA")
-    for lines, color in ((preview.lines, COLOR), (preview.mark, SNAPPED_COLOR)):
+    for lines, color in ((preview.lines, preview.color), (preview.mark, SNAPPED_COLOR)):
         _draw_lines([line for line in lines if len(line) > 1], color)
     gpu.state.blend_set("NONE")
 

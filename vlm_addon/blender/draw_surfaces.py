@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mathutils import Vector
@@ -46,23 +46,8 @@ class SurfaceHit:
 
 def hits_along(scene: Any, depsgraph: Any, origin: Float64, direction: Float64, reach: float) -> Iterator[SurfaceHit]:
     """The visible surfaces that a ray meets, from near to far; direction: (3,) unit; reach: m."""
-    travelled = 0.0
-    way = Vector(direction)
-    for _ in range(MOST_PASSED):
-        start = origin + travelled * direction
-        found, location, normal, face, thing, matrix = scene.ray_cast(
-            depsgraph, Vector(start), way, distance=reach - travelled
-        )
-        if not found:
-            return
-        here = np.array(location, np.float64)
-        travelled += max(float((here - start) @ direction), 0.0)
-        if not (is_light_mesh(thing) or thing.hide_render):
-            placed = np.array(matrix, np.float64)
-            yield SurfaceHit(here, _unit(normal), travelled, _key(thing), face, placed)
-        travelled += STEP_SHARE * max(travelled, float(np.abs(here).max()), 1.0)
-        if travelled >= reach:
-            return
+    for met in _met(scene, depsgraph, origin, direction, reach):
+        yield _hit(met)
 
 
 def surface_under(
@@ -73,21 +58,57 @@ def surface_under(
     sign: -1 for one that faces the other way. None where there is none.
     """
     best, least = None, np.inf
-    for hit in hits_along(scene, depsgraph, point + reach * normal, -normal, 2.0 * reach):
-        gap = abs(hit.distance - reach)
+    front = Vector(sign * normal)
+    for met in _met(scene, depsgraph, point + reach * normal, -normal, 2.0 * reach):
+        gap = abs(met.distance - reach)
         if gap > least:
             break
-        if sign * float(hit.normal @ normal) > FACING_COSINE:
-            best, least = hit, gap
-    return best
+        if met.normal.dot(front) > FACING_COSINE:
+            best, least = met, gap
+    return None if best is None else _hit(best)
+
+
+class _Met(NamedTuple):
+    """What Blender says of a hit; conversion to arrays takes longer than the ray."""
+
+    distance: float
+    location: Any
+    normal: Any
+    face: int
+    thing: Any
+    matrix: Any
+
+
+def _met(scene: Any, depsgraph: Any, origin: Float64, direction: Float64, reach: float) -> Iterator[_Met]:
+    travelled = 0.0
+    start, way = Vector(origin), Vector(direction)
+    here = start
+    for _ in range(MOST_PASSED):
+        found, location, normal, face, thing, matrix = scene.ray_cast(depsgraph, here, way, distance=reach - travelled)
+        if not found:
+            return
+        travelled = max((location - start).dot(way), travelled)
+        if not (is_light_mesh(thing) or thing.hide_render):
+            yield _Met(travelled, location, normal, face, thing, matrix)
+        travelled += STEP_SHARE * max(travelled, max(map(abs, location)), 1.0)
+        if travelled >= reach:
+            return
+        here = Vector(origin + travelled * direction)
+
+
+def _hit(met: _Met) -> SurfaceHit:
+    normal = np.array(met.normal, np.float64)
+    length = float(np.linalg.norm(normal))
+    return SurfaceHit(
+        location=np.array(met.location, np.float64),
+        normal=normal / length if length > 0.0 else normal,
+        distance=met.distance,
+        key=_key(met.thing),
+        face=met.face,
+        matrix=np.array(met.matrix, np.float64),
+    )
 
 
 def _key(thing: Any) -> tuple[str, str | None]:
     library = thing.original.library if thing.is_evaluated else thing.library
     return thing.name, None if library is None else library.filepath
-
-
-def _unit(vector: Any) -> Float64:
-    values = np.array(vector, np.float64)
-    length = float(np.linalg.norm(values))
-    return values / length if length > 0.0 else values

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from . import draw_keys, draw_preview
+from . import draw_keys, draw_preview, kept_materials
 
 MODES = {"OBJECT": "object", "EDIT_MESH": "edit_mesh"}
 
@@ -83,6 +83,7 @@ def tool_name(tool: Tool, mode: str) -> str:
 def register(undo: ExitStack) -> None:
     """Add keys and tools; `undo` hears how to take them out."""
     draw_preview.register(undo)
+    kept_materials.register(undo)
     draw_keys.register_keys(undo)
     classes = tool_classes()
     for cls, following in zip(classes, [None, *classes], strict=False):
