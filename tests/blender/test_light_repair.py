@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One-click fixes of what the check finds, written into light meshes of the open file."""
+
+import bpy
+import numpy as np
+import pytest
+
+from vlm_addon.bake import BakeSettings
+from vlm_addon.blender import authoring
+from vlm_addon.blender.findings import fixable_kinds, marked_faces, select_offenders
+from vlm_addon.blender.light_faces import read_faces, write_faces
+from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.light_repair import kinds_to_fix, work_on, write_fixed
+from vlm_addon.blender.properties import ensure_scene_settings
+from vlm_addon.core import finding_kinds as kinds
+from vlm_addon.core.errors import InvalidInput
+from vlm_addon.core.light_links import leaves_out
+from vlm_addon.core.progress import silent
+
+ensure_scene_settings()
+
+
+@pytest.fixture
+def lights(make_cube):
+    """The light mesh of a cube of edge 2: twelve lights, each just inside."""
+    make_cube()
+    bpy.context.view_layer.update()
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
+    return bpy.data.objects["VLM"]
+
+
+def check():
+    """Kinds of what the check finds, as the scene keeps them."""
+    authoring.list_checked(authoring.check(bpy.context)(silent))
+    return [item.kind for item in bpy.context.scene.vlm.findings if item.kind]
+
+
+def fix(kind=""):
+    """All steps of one fix; returns the sentences."""
+    told = []
+    for each in kinds_to_fix(bpy.context.scene, kind):
+        work = work_on(bpy.context, each)
+        while work is not None:
+            sentence, work = write_fixed(bpy.context, work(silent))
+            told.append(sentence)
+    return told
+
+
+def spoil(thing, name, row, value):
+    values = read_faces(thing, name)
+    values[row] = value
+    write_faces(thing, name, values)
+
+
+def middle(thing, face):
+    return np.array(thing.matrix_world @ thing.data.polygons[face].center)
+
+
+def test_a_sound_light_mesh_has_nothing_to_fix(lights):
+    assert check() == []
+    with pytest.raises(InvalidInput, match="none of them can be fixed"):
+        fix()
+
+
+@pytest.mark.parametrize(("value", "kind"), [(np.nan, kinds.NOT_FINITE), (np.inf, kinds.NOT_FINITE)])
+def test_values_that_are_no_numbers_become_black(lights, value, kind):
+    before = read_faces(lights, "vlm_color")
+    spoil(lights, "vlm_color", 4, value)
+    assert kind in check()
+    assert marked_faces(bpy.context.scene, bpy.context.scene.vlm.findings[0])["VLM"].tolist() == [4]
+    fix()
+    after = read_faces(lights, "vlm_color")
+    assert after[4, :3].tolist() == [0.0, 0.0, 0.0]
+    assert np.array_equal(np.delete(after, 4, axis=0), np.delete(before, 4, axis=0))
+    assert check() == []
+
+
+def test_negative_colours_and_factors_become_zero(lights):
+    spoil(lights, "vlm_color", 2, -1.0)
+    lights["vlm_hue"] = (1.0, -2.0, 1.0)
+    assert kinds.NEGATIVE in check()
+    fix(kinds.NEGATIVE)
+    assert read_faces(lights, "vlm_color")[2, :3].tolist() == [0.0, 0.0, 0.0]
+    assert list(lights["vlm_hue"]) == [1.0, 0.0, 1.0]
+
+
+def test_a_light_that_was_turned_over_is_turned_back(lights):
+    normal = np.array(lights.data.polygons[7].normal)
+    lights.data.polygons[7].flip()
+    lights.data.update()
+    found = check()
+    assert {kinds.NON_MANIFOLD, kinds.INSIDE_OUT} & set(found)
+    fix()
+    assert np.array(lights.data.polygons[7].normal) == pytest.approx(normal)
+    assert check() == []
+
+
+def test_a_light_in_front_is_pushed_behind_with_its_power(lights):
+    power = area_times_scale(lights)
+    for vertex in lights.data.vertices:
+        vertex.co *= 1.05
+    lights.data.update()
+    assert kinds.IN_FRONT in check()
+    fix(kinds.IN_FRONT)
+    assert check() == []
+    places = np.array([lights.matrix_world @ vertex.co for vertex in lights.data.vertices])
+    assert np.abs(places).max() < 1.0
+    assert area_times_scale(lights) == pytest.approx(1.05**2 * power, rel=1e-5)
+
+
+def area_times_scale(thing):
+    areas = np.array([polygon.area for polygon in thing.data.polygons])
+    return float(areas @ read_faces(thing, "vlm_area_scale"))
+
+
+def test_fixing_in_edit_mode_ends_there(lights):
+    spoil(lights, "vlm_color", 0, -1.0)
+    bpy.context.view_layer.objects.active = lights
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert kinds.NEGATIVE in check()
+    fix()
+    assert bpy.context.mode == "EDIT_MESH"
+    assert read_faces(lights, "vlm_color")[0, :3].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_what_an_artist_may_have_meant_has_its_own_button_alone(lights):
+    spoil(lights, "vlm_color", 3, (4.0, 2.0, 1.0, 1.0))
+    assert check() == [kinds.BRIGHT]
+    assert fixable_kinds(bpy.context.scene) == []
+    fix(kinds.BRIGHT)
+    assert read_faces(lights, "vlm_color")[3, :3] == pytest.approx([1.0, 0.5, 0.25], rel=1e-6)
+
+
+def test_a_tag_without_a_surface_is_cleared(lights):
+    spoil(lights, "vlm_tag", 5, 77)
+    assert check() == [kinds.LOST_TAG]
+    fix()
+    assert not read_faces(lights, "vlm_tag").any()
+
+
+def test_lights_without_area_are_deleted(lights):
+    first = lights.data.polygons[0].vertices
+    moved = lights.data.vertices[first[0]].co.copy()
+    lights.data.vertices[first[1]].co = moved
+    lights.data.update()
+    assert kinds.DEGENERATE in check()
+    count = sum(polygon.area < 1e-12 for polygon in lights.data.polygons)
+    fix(kinds.DEGENERATE)
+    assert len(lights.data.polygons) == 12 - count
+    assert kinds.DEGENERATE not in check()
+
+
+def test_a_sheet_seen_from_both_sides_gets_tags_by_which_it_leaves_its_lights_out(make_plane):
+    sheet = make_plane("sheet", size=1.0)
+    sheet.location.z = 1.0
+    floor = make_plane("floor", size=4.0)
+    bpy.context.view_layer.update()
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
+    thing = bpy.data.objects["VLM"]
+    assert check() == [kinds.TWO_SIDED]
+    fix()
+    over = np.array([middle(thing, face)[2] > 0.5 for face in range(len(thing.data.polygons))])
+    tags = read_faces(thing, "vlm_tag")
+    assert (tags[over] > 0).all()
+    assert not tags[~over].any()
+    (tag,) = read_faces(sheet, "vlm_tag").tolist()
+    assert leaves_out(extract().light_mesh.links, tags, tag).tolist() == over.tolist()
+    assert not read_faces(floor, "vlm_tag").any()
+    assert check() == []
+
+
+def test_a_deformed_light_mesh_is_not_moved_and_said_to_be(lights):
+    for vertex in lights.data.vertices:
+        vertex.co *= 1.05
+    lights.modifiers.new("Cast", "CAST").factor = 0.0
+    before = [vertex.co.copy() for vertex in lights.data.vertices]
+    assert kinds.IN_FRONT in check()
+    (told,) = fix(kinds.IN_FRONT)
+    assert "left out 'VLM', which modifiers or shape keys deform" in told
+    assert [vertex.co for vertex in lights.data.vertices] == before
+
+
+def test_offenders_are_selected_in_edit_mode(lights):
+    spoil(lights, "vlm_color", 3, 4.0)
+    spoil(lights, "vlm_color", 8, 4.0)
+    check()
+    assert select_offenders(bpy.context, 0) == 2
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [polygon.index for polygon in lights.data.polygons if polygon.select] == [3, 8]
+
+
+def test_a_light_mesh_that_has_changed_since_is_to_be_checked_again(lights):
+    spoil(lights, "vlm_color", 3, 4.0)
+    check()
+    bpy.context.view_layer.objects.active = lights
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide()
+    with pytest.raises(InvalidInput, match="it has 48 faces and had 12 when it was checked; run Check again"):
+        select_offenders(bpy.context, 0)
+
+
+def test_a_finding_that_is_not_there_is_named():
+    with pytest.raises(InvalidInput, match="there is no finding 3, the last check has 0"):
+        select_offenders(bpy.context, 3)
