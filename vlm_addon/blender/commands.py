@@ -9,6 +9,7 @@ from dataclasses import asdict
 import bpy
 
 from ..bake import Bake, BakeSettings, bake
+from ..core.bake_key import surface_hashes
 from ..core.errors import InvalidInput
 from ..core.light_grid_export import SUFFIX as FIXED_SIZE_SUFFIX
 from ..core.light_grid_export import save_fixed_size_lists
@@ -19,6 +20,7 @@ from ..light_grid_bake import GridBake, bake_light_grid, check_lights
 from ..terminal import TerminalProgress
 from .authoring import NAME, over_budget
 from .availability import light_mesh_objects
+from .bake_state import set_made_from
 from .command_support import opened_scene, print_findings, require_apart, scene_report, write_json
 from .extract import ExtractOptions
 from .light_grid_options import keep_options, scene_grid_settings
@@ -48,7 +50,8 @@ def bake_command(arguments: Namespace) -> None:
         for other in light_mesh_objects(bpy.context.scene):
             if other.name != NAME:
                 bpy.data.objects.remove(other)
-        write_light_mesh(made.light_mesh, NAME, [mesh.name for mesh in found.snapshot.meshes])
+        written = write_light_mesh(made.light_mesh, NAME, [mesh.name for mesh in found.snapshot.meshes])
+        set_made_from(written, surface_hashes(found.snapshot.meshes))
     findings = made.findings
     if settings is not None and drawn:
         problem = f"the scene has light meshes drawn by hand ({', '.join(drawn)}), so --triangles made no other"
