@@ -13,6 +13,7 @@ from vlm_addon.core import finding_kinds as kinds
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out
 from vlm_addon.core.light_mesh import VirtualLightMesh
+from vlm_addon.core.nearest_lights import pair_nearest
 from vlm_addon.core.repair import can_fix, fix
 from vlm_addon.core.scene import Mesh
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
@@ -102,21 +103,34 @@ def test_only_what_the_chosen_lights_stand_for_moves_them() -> None:
     assert (mended.vertices[~touched] == raised.vertices[~touched]).all()
 
 
-def bent_shell(thickness: float) -> list[Mesh]:
-    top, triangles = sheet(lambda x, y: 0.2 * np.sin(np.pi * x) * np.sin(np.pi * y), 16, 16)
+def bump(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 0.2 * np.sin(np.pi * x) * np.sin(np.pi * y)
+
+
+def shell(cells: int, thickness: float) -> list[Mesh]:
+    top, triangles = sheet(bump, cells, cells)
     return [mesh_of(top, triangles), mesh_of(top - np.array([0, 0, thickness]), triangles[:, ::-1])]
 
 
+def bent_shell(thickness: float) -> list[Mesh]:
+    return shell(16, thickness)
+
+
 def test_thin_body_gets_tags_where_moving_would_pass_its_other_side() -> None:
-    thickness = 2e-3
+    thickness = 4e-3
     meshes = bent_shell(thickness)
-    made = create_light_mesh(meshes, SimplifySettings(16))
-    light_mesh = made.light_mesh
-    repair = fix(kinds.IN_FRONT, light_mesh, meshes, np.arange(len(light_mesh)), made.light_of_triangle)
+    # As many lights as triangles: nothing is placed but by the inset.
+    light_mesh = create_light_mesh(shell(4, thickness), SimplifySettings(1000)).light_mesh
+    repair = fix(kinds.IN_FRONT, light_mesh, meshes, np.arange(len(light_mesh)))
     mended, surface = repair.applied(light_mesh), repair.applied_to(meshes)
-    assert np.linalg.norm(mended.vertices - light_mesh.vertices, axis=1).max() < thickness
+    # Around the open rim of the shell there is no other side.
+    inner = (np.abs(light_mesh.vertices[:, :2] - 0.5) < 0.4).all(axis=1)
+    height = mended.vertices[:, 2] - bump(mended.vertices[:, 0], mended.vertices[:, 1])
+    assert np.linalg.norm(mended.vertices - light_mesh.vertices, axis=1)[inner].max() > 0.1 * thickness
+    assert height[inner].max() < 1e-4
+    assert height[inner].min() > -thickness - 1e-4
     assert repair.tag_ids is not None
-    for mesh, lights in zip(surface, made.light_of_triangle, strict=True):
+    for mesh, lights in zip(surface, pair_nearest(light_mesh, meshes), strict=True):
         tagged = repair.tag_ids[lights] != 0
         assert tagged.any()
         assert leaves_out(mended.links, mended.tag_ids[lights], mesh.tag_ids)[tagged].all()

@@ -16,6 +16,7 @@ import numpy as np
 
 from .mesh_topology import Bool, Int64, Rows, sum_by, vertex_faces
 from .scene import Float64
+from .triangle_distance import flat_triangles
 from .triangle_tree import build_tree
 
 FirstHits = Callable[[Float64, Float64, bool], Float64]
@@ -64,7 +65,8 @@ def place_behind(positions: Float64, triangles: Int64, regions: Rows, source_cor
     towards = _mean_normals(facing, source_corners)
     inset = insets(positions[triangles])
     around = vertex_faces(triangles, len(positions))
-    tree = build_tree(positions[triangles])
+    bodies = build_tree(positions[triangles]), build_tree(source_corners)
+    surface_points = _surface_points(positions, facing, source_corners, around)
     longest = LARGEST_STEP * _smallest_around(np.sqrt(_normals(positions[triangles])[1]), around)
     # What moves by the insets alone is not looked at: no body that shows is that thin.
     least = INSETS_UNSEEN * _largest_around(inset, around)
@@ -77,7 +79,10 @@ def place_behind(positions: Float64, triangles: Int64, regions: Rows, source_cor
         moved = _shortened(moved, longest)
         length = np.linalg.norm(moved, axis=1)
         fresh = np.linalg.norm(moved - looked_at, axis=1) > np.maximum(least, 0.01 * length)
-        moved, hit = _within_thickness(positions, moved, np.flatnonzero(fresh), tree.first_hits)
+        # The lights' other side may come towards them, and lights that stand beyond the body's come back into it.
+        moved, hit = _within_thickness(positions, moved, np.flatnonzero(fresh), positions, bodies[0].first_hits)
+        moved, out = _within_thickness(positions, moved, np.flatnonzero(fresh), surface_points, bodies[1].first_hits)
+        hit |= out
         looked_at[fresh] = moved[fresh]
         # Later rounds may turn the way of a stopped vertex past the edge of what stopped it, but not make it longer.
         longest[hit] = np.minimum(longest, np.linalg.norm(moved, axis=1))[hit]
@@ -190,16 +195,44 @@ def _shortened(moved: Float64, longest: Float64) -> Float64:
     return moved * np.minimum(1.0, longest / np.where(length > 0, length, 1.0))[:, None]
 
 
-def _within_thickness(positions: Float64, moved: Float64, active: Int64, first_hits: FirstHits) -> tuple[Float64, Bool]:
-    """Moves of the active vertices cut to THICKNESS_SHARE of the way to where they would leave the body, and which
-    were cut."""
-    reach = moved[active] / THICKNESS_SHARE
-    # A short way inside, so that the triangles around the vertex itself are not met.
-    start = positions[active] + 0.01 * reach
-    fraction = first_hits(start, positions[active] + reach, True)
+def _surface_points(positions: Float64, regions: Rows, source_corners: Float64, around: Rows) -> Float64:
+    """(v, 3) m: about the nearest point to each vertex of the regions of the lights around it; itself without any.
+
+    That of the source triangle of which a corner or the middle is nearest.
+    """
+    vertex, light = around.expand(np.arange(len(positions)))
+    of_pair, triangle = regions.expand(light)
+    vertex = vertex[of_pair]
+    points = positions.copy()
+    if not len(vertex):
+        return points
+    square = np.full(len(vertex), np.inf)
+    for place in (*np.moveaxis(source_corners, 1, 0), source_corners.mean(axis=1)):
+        square = np.minimum(square, ((place[triangle] - positions[vertex]) ** 2).sum(axis=1))
+    order = np.lexsort([square, vertex])
+    first = order[np.diff(vertex[order], prepend=-1) > 0]
+    chosen = triangle[first]
+    flat = flat_triangles(source_corners[chosen])
+    points[vertex[first]] = flat.nearest_points(positions[vertex[first]], np.arange(len(chosen)))
+    return points
+
+
+def _within_thickness(
+    positions: Float64, moved: Float64, active: Int64, surface_points: Float64, first_hits: FirstHits
+) -> tuple[Float64, Bool]:
+    """Moves of the active vertices cut to THICKNESS_SHARE of the way from the surface above them to where they would
+    leave the body, and which were cut."""
+    depth = positions[active] + moved[active] - surface_points[active]
+    inwards = np.einsum("ij,ij->i", depth, moved[active]) > 0
+    active, depth = active[inwards], depth[inwards]
+    reach = depth / THICKNESS_SHARE
+    # A short way inside, so that the triangles around the point itself are not met.
+    start = surface_points[active] + 0.01 * reach
+    fraction = first_hits(start, surface_points[active] + reach, True)
     cut = fraction < 1.0
     moved = moved.copy()
-    moved[active[cut]] *= (0.01 + 0.99 * fraction[cut])[:, None]
+    kept = depth[cut] * (0.01 + 0.99 * fraction[cut])[:, None]
+    moved[active[cut]] = surface_points[active[cut]] + kept - positions[active[cut]]
     stopped = np.zeros(len(positions), bool)
     stopped[active[cut]] = True
     return moved, stopped

@@ -40,6 +40,26 @@ class FlatTriangles:
             inside &= side_x * from_y - side_y * from_x >= 0
         return np.where(inside, 0.0, best) + height * height
 
+    def nearest_points(self, points: Float64, triangle: Int64) -> Float64:
+        """(p, 3) m: the point of each triangle that is nearest to the point beside it."""
+        offset = points - self.origins[triangle]
+        flat = self.flat[triangle]
+        place = np.einsum("ikj,ij->ik", self.frames[triangle, :2], offset)
+        best, nearest = np.full(len(points), np.inf), place.copy()
+        inside = np.ones(len(points), bool)
+        for corner in range(3):
+            start = flat[:, corner]
+            side, way = flat[:, (corner + 1) % 3] - start, place - start
+            square = np.einsum("ij,ij->i", side, side)
+            along = np.einsum("ij,ij->i", way, side) / np.where(square > 0, square, 1.0)
+            on_side = start + np.clip(along, 0.0, 1.0)[:, None] * side
+            far = ((place - on_side) ** 2).sum(axis=1)
+            nearest = np.where((far < best)[:, None], on_side, nearest)
+            best = np.minimum(best, far)
+            inside &= side[:, 0] * way[:, 1] - side[:, 1] * way[:, 0] >= 0
+        nearest = np.where(inside[:, None], place, nearest)
+        return self.origins[triangle] + np.einsum("ik,ikj->ij", nearest, self.frames[triangle, :2])
+
 
 def flat_triangles(corners: Float64) -> FlatTriangles:
     """Of (n, 3, 3) corners, m; a triangle without area is the segment or point that it is."""
