@@ -36,3 +36,13 @@ def test_a_share_of_the_lights_halves_the_largest(split_share: float) -> None:
 @pytest.mark.parametrize(("lights", "split_share", "expected"), [(2000, 0.25, 1500), (1, 0.9, 1), (1000, 0.0, 1000)])
 def test_lights_for_shape_are_the_others(lights: int, split_share: float, expected: int) -> None:
     assert BakeSettings(lights, split_share=split_share).shape_lights == expected
+
+
+def test_kept_lights_come_first_and_are_not_halved() -> None:
+    room = white_room()
+    made = bake(room, None, BakeSettings(400)).light_mesh
+    kept = made.subset(np.arange(len(made)) < 3)
+    again = bake(room, None, BakeSettings(400, split_share=0.5), keep=kept).light_mesh
+    assert len(again) == 400
+    np.testing.assert_array_equal(again.corners[:3], kept.corners)
+    np.testing.assert_allclose(again.areas.sum(), made.areas.sum(), rtol=1e-6)

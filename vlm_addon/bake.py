@@ -6,8 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from .core.errors import InvalidInput
-from .core.light_mesh import VirtualLightMesh, require_valid
+from .core.light_mesh import VirtualLightMesh, join, require_valid
 from .core.progress import Progress, silent
 from .core.scene import Finding, Int32, SceneSnapshot
 from .core.settings import OWN, setting
@@ -27,6 +29,15 @@ class BakeSettings(SimplifySettings):
         0.9,
         "Of the lights, how many are spent on halving the largest: simplification keeps a flat wall as two lights, and "
         "light on it is then even all over",
+        source=OWN,
+    )
+
+    even_power: float = setting(
+        1.0,
+        "share",
+        0.0,
+        1.0,
+        "What is halved first: at 0 the largest lights, at 1 those that reflect most, so that bright objects get more",
         source=OWN,
     )
 
@@ -77,12 +88,14 @@ def bake(
     settings: BakeSettings | None = None,
     progress: Progress = silent,
     faces: SurfaceFaces | None = None,
+    keep: VirtualLightMesh | None = None,
 ) -> Bake:
     """The light mesh of a scene: `existing` where there is one and no `settings` ask for another, else a new one.
 
     faces: where given, a new light mesh and its surface get tags by which each face leaves out the lights that stand
-    for it. Raises InvalidInput where the scene shows no surface to make lights of, or `existing` holds values that are
-    not finite or negative, and for more links than there can be; Cancelled.
+    for it. keep: lights that stay as they are, first in the new light mesh, and count. Raises InvalidInput where the
+    scene shows no surface to make lights of, or `existing` holds values that are not finite or negative, for fewer
+    lights than are kept, and for more links than there can be; Cancelled.
     """
     creation, face_tags, meshes = None, None, snapshot.meshes
     if existing is not None and settings is None:
@@ -93,13 +106,24 @@ def bake(
             problem = "no visible object in it has a surface"
             raise InvalidInput(f"scene {snapshot.name!r}", problem, "add a mesh or enable one in renders")
         chosen = settings or BakeSettings()
-        created = create_light_mesh(snapshot.meshes, replace(chosen, target_triangles=chosen.shape_lights), progress)
+        locked = len(keep) if keep is not None else 0
+        shape = replace(chosen, target_triangles=max(chosen.shape_lights, min(locked + 1, chosen.target_triangles)))
+        created = create_light_mesh(snapshot.meshes, shape, progress, keep)
         light_mesh, creation = created.light_mesh, created.report
         if faces is not None:
             light_mesh, face_tags = tagged_by_map(light_mesh, created.light_of_triangle, faces)
             meshes = faces.tagged(meshes, face_tags)
         if chosen.split_share > 0.0:
-            light_mesh = subdivide_light_mesh(light_mesh, chosen.target_triangles, chosen.samples_per_light)
+            light_mesh = _split(light_mesh, locked, chosen)
     findings = check_light_mesh(light_mesh, meshes)
     made = creation.findings if creation is not None else ()
     return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings), face_tags)
+
+
+def _split(light_mesh: VirtualLightMesh, locked: int, settings: BakeSettings) -> VirtualLightMesh:
+    """`light_mesh` with its lights halved up to the number asked for, but for the first `locked` ones."""
+    first = np.arange(len(light_mesh)) < locked
+    free = light_mesh.subset(~first) if locked else light_mesh
+    target = max(settings.target_triangles - locked, 1)
+    halved = subdivide_light_mesh(free, target, settings.samples_per_light, settings.even_power)
+    return join([light_mesh.subset(first), halved]) if locked else halved

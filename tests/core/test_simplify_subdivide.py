@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,17 @@ def test_enough_lights_are_left_alone() -> None:
 def test_target_below_one_is_refused() -> None:
     with pytest.raises(InvalidInput, match="at least 1"):
         subdivide_light_mesh(ROOM, 0)
+
+
+def test_halving_by_power_evens_it_out() -> None:
+    even = subdivide_light_mesh(ROOM, 1000, even_power=1.0)
+    power = even.areas * even.strength * even.colour.mean(axis=1)
+    assert power.max() < 4.5 * power.min()
+    by_area = subdivide_light_mesh(ROOM, 1000)
+    uneven = by_area.areas * by_area.strength * by_area.colour.mean(axis=1)
+    assert uneven.max() > 6.0 * uneven.min()
+
+
+def test_black_lights_are_halved_when_nothing_else_is_left() -> None:
+    black = replace(ROOM, colour=np.zeros_like(ROOM.colour))
+    assert len(subdivide_light_mesh(black, 100, even_power=1.0)) == 100

@@ -15,10 +15,17 @@ from .scene import Float64
 
 # Below this cosine between a light and its source surface a point is not moved along the light's normal.
 STEEPEST_COSINE = 0.1
+# What black lights count as, so that they are halved at last.
+LEAST_BRIGHTNESS = 1e-3
 
 
-def subdivide_light_mesh(light_mesh: VirtualLightMesh, target: int, samples_per_light: int = 16) -> VirtualLightMesh:
+def subdivide_light_mesh(
+    light_mesh: VirtualLightMesh, target: int, samples_per_light: int = 16, even_power: float = 0.0
+) -> VirtualLightMesh:
     """`light_mesh` with its largest lights halved at their longest edge until there are `target` lights.
+
+    even_power: what is large: from 0, the area, to 1, the power that a light sends out under unit irradiance (emitters
+    count as white at their mean).
 
     Lights are independent, so an edge may be halved on one side only. Colour, emission, strength, tag and motion are
     those of the parent, so power is unchanged. Each half is sampled anew: points of the half, moved along its normal
@@ -29,7 +36,7 @@ def subdivide_light_mesh(light_mesh: VirtualLightMesh, target: int, samples_per_
         raise InvalidInput("subdivision", f"{target} lights, {samples_per_light} samples", "ask for at least 1 of each")
     if not len(light_mesh) or len(light_mesh) >= target:
         return light_mesh
-    corners, parent = _halved(light_mesh.corners, target)
+    corners, parent = _halved(light_mesh.corners, _brightness(light_mesh) ** even_power, target)
     vertices, triangles = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     return replace(
         light_mesh,
@@ -44,11 +51,22 @@ def subdivide_light_mesh(light_mesh: VirtualLightMesh, target: int, samples_per_
     )
 
 
-def _halved(corners: Float64, target: int) -> tuple[Float64, Int64]:
-    """(corners of `target` triangles, parent of each); in rounds that halve all within a factor two of the largest."""
+def _brightness(light_mesh: VirtualLightMesh) -> Float64:
+    """(n,) of each light, more than 0."""
+    emission = light_mesh.emission.mean(axis=1, dtype=np.float64)
+    shining = emission > 0
+    mean = float(emission[shining].mean()) if shining.any() else 1.0
+    brightness = light_mesh.colour.mean(axis=1, dtype=np.float64) + np.minimum(emission / mean, 1.0)
+    return np.maximum(light_mesh.strength * brightness, LEAST_BRIGHTNESS)
+
+
+def _halved(corners: Float64, brightness: Float64, target: int) -> tuple[Float64, Int64]:
+    """(corners of `target` triangles, parent of each); in rounds that halve all within a factor two of the largest,
+    by area times the brightness of the parent."""
     parent = np.arange(len(corners))
     while len(corners) < target:
         doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        doubled *= brightness[parent]
         order = np.argsort(-doubled, kind="stable")
         large = int((doubled > 0.5 * doubled.max()).sum())
         chosen = order[: max(1, min(large, target - len(corners)))]
