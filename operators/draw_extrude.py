@@ -27,5 +27,5 @@ class VLM_OT_draw_extrude(draw_gestures.ExtrudeGesture, draw_operators.NewLights
     def carry_out(self, context):
         edge = draw_points.exactly(self.edge, 2, "edge")
         path, normals = draw_points.stroke(self.points, self.normals, least=1, normals_needed=True)
-        points, rings = draw_shapes.strip(edge, path, normals)
-        return draw_lights.draw(context, points, rings, normals, self.offset, self.target)
+        points, rings, facing = draw_shapes.strip(edge, path, normals)
+        return draw_lights.draw(context, points, rings, facing, self.offset, self.target)

@@ -215,6 +215,47 @@ def test_on_instances_of_a_collection(red_plane):
     (mesh,) = extract_scene().meshes
     assert np.allclose(read_faces(made, "vlm_color")[0, :3], mesh.reflectance[0], rtol=1e-6)
     assert read_faces(made, "vlm_tag").tolist() == [7]
+    del red_plane["vlm_tag"]
+    empty["vlm_tag"] = 8
+    draw(SQUARE + np.array([11.0, 0.0, 3.0]))
+    assert read_faces(made, "vlm_tag").tolist() == [7, 8]
+
+
+def test_on_instances_that_geometry_nodes_make(make_plane, make_material):
+    material, shader = make_material()
+    shader.inputs["Base Color"].default_value = (0.1, 0.5, 0.2, 1.0)
+    owner = make_plane("Owner", 1.0)
+    tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    points, copies, grid, paint, out = (
+        tree.nodes.new(kind)
+        for kind in (
+            "GeometryNodeMeshLine",
+            "GeometryNodeInstanceOnPoints",
+            "GeometryNodeMeshGrid",
+            "GeometryNodeSetMaterial",
+            "NodeGroupOutput",
+        )
+    )
+    points.inputs["Count"].default_value = 2
+    points.inputs["Offset"].default_value = (20.0, 0.0, 0.0)
+    grid.inputs["Size X"].default_value = grid.inputs["Size Y"].default_value = 4.0
+    paint.inputs["Material"].default_value = material
+    for source, target in (
+        (grid.outputs["Mesh"], paint.inputs["Geometry"]),
+        (paint.outputs[0], copies.inputs["Instance"]),
+    ):
+        tree.links.new(source, target)
+    tree.links.new(points.outputs[0], copies.inputs["Points"])
+    tree.links.new(copies.outputs[0], out.inputs[0])
+    owner.modifiers.new("Scatter", "NODES").node_group = tree
+    owner["vlm_tag"] = 5
+    bpy.context.view_layer.update()
+    made = draw(SQUARE + np.array([20.0, 0.0, 0.0]))
+    mesh = extract_scene().meshes[-1]
+    assert np.allclose(read_faces(made, "vlm_color")[0, :3], mesh.reflectance[0], rtol=1e-6)
+    assert read_faces(made, "vlm_color")[0, 1] > 0.3, "the green of the instances"
+    assert read_faces(made, "vlm_tag").tolist() == [5]
 
 
 def test_on_linked_scenery_nothing_of_it_changes(red_plane, tmp_path):

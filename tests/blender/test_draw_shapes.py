@@ -128,13 +128,31 @@ def test_a_strip_turns_with_the_surface_and_keeps_its_width():
     angles = np.linspace(0.0, math.pi / 2, 7)
     normals = np.column_stack([np.sin(angles), np.zeros(7), np.cos(angles)])
     edge = np.array([(0.0, -0.5, 1.0), (0.0, 0.5, 1.0)])
-    points, rings = strip(edge, normals[1:], normals[1:])
+    points, rings, facing = strip(edge, normals[1:], normals[1:])
     assert np.array_equal(points[:2], edge)
     assert len(rings) == 6
+    assert np.array_equal(facing, normals[1:])
     ends = points.reshape(-1, 2, 3)
     assert np.allclose(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1.0)
     assert np.allclose(np.einsum("ij,ij->i", ends[:, 1] - ends[:, 0], normals), 0.0, atol=1e-12)
     assert np.allclose(ends.mean(axis=1)[1:], normals[1:])
+
+
+def test_a_strip_bends_in_the_corner_of_two_walls():
+    edge = np.array([(-1.0, -0.5, 0.0), (-1.0, 0.5, 0.0)])
+    path = np.array([(-1.0, 0.0, 0.0), (0.0, 0.0, 0.7)])
+    floor, wall = (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)
+    points, rings, facing = strip(edge, path, np.array([floor, wall]))
+    assert len(rings) == 2
+    assert np.allclose(points[2:4], [(0.0, -0.5, 0.0), (0.0, 0.5, 0.0)])
+    assert np.allclose(points[4:], [(0.0, -0.5, 0.7), (0.0, 0.5, 0.7)])
+    assert np.allclose(facing, [floor, wall])
+
+
+def test_a_strip_that_leaves_nothing_is_refused():
+    edge = np.array([(0.0, -0.5, 1.0), (0.0, 0.5, 1.0)])
+    with pytest.raises(InvalidInput, match="does not leave"):
+        strip(edge, np.array([(0.0, 0.0, 1.0)]), np.array([(0.0, 0.0, 1.0)]))
 
 
 def test_an_outline_keeps_what_it_needs_and_no_more():

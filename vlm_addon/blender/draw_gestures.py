@@ -117,7 +117,7 @@ class ExtrudeGesture(ModalStroke):
         found = nearest_edge(self._view, place.pixel, vertices[np.array(pairs, np.int64).reshape(-1, 2)], EDGE_PIXELS)
         if found is None:
             return "There is no edge of a light under the mouse"
-        self._edge, self._grabbed = found
+        self._edge = found
         self.edge = text_of(self._edge)
         return None
 
@@ -131,16 +131,18 @@ class ExtrudeGesture(ModalStroke):
         if len(places) < 2:
             return []
         path, normals = self._way(places)
-        points, rings = strip(self._edge, path, normals)
+        points, rings, _ = strip(self._edge, path, normals)
         return [points[[*ring, ring[0]]] for ring in rings]
 
     def status(self, places: list[Place]) -> str:
         """What is to be done, and how many lights there will be."""
-        return f"{len(self._way(places)[0])} lights" if len(places) > 1 else "drag an edge of a light"
+        count = len(strip(self._edge, *self._way(places))[1]) if len(places) > 1 else 0
+        return light_count(count) if count else "drag an edge of a light"
 
     def _way(self, places: list[Place]) -> tuple[Float64, Float64]:
-        shift = self._edge.mean(axis=0) - self._grabbed
-        rows = way_in_steps(_locations(places), float(np.linalg.norm(self._edge[1] - self._edge[0])))
+        # The grabbed point of the edge shows at the first place, and goes the way that the mouse goes.
+        shift = self._edge.mean(axis=0) - places[0].location
+        rows = [0, *way_in_steps(_locations(places), float(np.linalg.norm(self._edge[1] - self._edge[0])))]
         return _locations(places)[rows] + shift, np.array([places[row].normal for row in rows])
 
 

@@ -23,6 +23,9 @@ from .names import TAG_ATTRIBUTE, TAG_PROPERTY
 ON_TRIANGLE = 1e-3
 """How far off a triangle, as a share of its size, a hit may lie that was reported on it."""
 
+SAME_PLACE = 1e-5
+"""Matrices that differ by no more place the same instance; Blender keeps them in float32."""
+
 
 @dataclass(frozen=True)
 class Looks:
@@ -121,6 +124,7 @@ class _Reader:
         self._extractor = material_reader(depsgraph)
         self._surfaces: dict[tuple[str, str | None], _Surface] = {}
         self._instances: dict[tuple[tuple[str, str | None], bytes], list[_Surface]] = {}
+        self._tags: dict[tuple[tuple[str, str | None], bytes], int] = {}
         self._temporary: list[Any] = []
 
     def close(self) -> None:
@@ -134,7 +138,7 @@ class _Reader:
         original = bpy.data.objects.get(hit.key)
         if original is None:
             return None
-        tag = int(original.get(TAG_PROPERTY, UNTAGGED))
+        tag = int(original.get(TAG_PROPERTY, UNTAGGED)) or self._instancer_tag(original, hit)
         if hit.key not in self._surfaces:
             self._surfaces[hit.key] = self._own(original)
         found = _under(self._surfaces[hit.key], tag, hit, piece)
@@ -144,6 +148,22 @@ class _Reader:
         if place not in self._instances:
             self._instances[place] = self._instanced(original, hit)
         return next(filter(None, (_under(surface, tag, hit, piece) for surface in self._instances[place])), None)
+
+    def _instancer_tag(self, original: Any, hit: SurfaceHit) -> int:
+        """Tag of what instances an object of no tag of its own in the place of the hit."""
+        place = (hit.key, hit.matrix.tobytes())
+        if place not in self._tags:
+            own = np.allclose(np.array(original.matrix_world), hit.matrix, atol=SAME_PLACE)
+            self._tags[place] = UNTAGGED if own else self._tag_of_instance(original, hit)
+        return self._tags[place]
+
+    def _tag_of_instance(self, original: Any, hit: SurfaceHit) -> int:
+        for instance in self._depsgraph.object_instances:
+            if not instance.is_instance or instance.parent is None or instance.object.original != original:
+                continue
+            if np.allclose(np.array(instance.matrix_world), hit.matrix, atol=SAME_PLACE):
+                return int(instance.parent.original.get(TAG_PROPERTY, UNTAGGED))
+        return UNTAGGED
 
     def _own(self, original: Any) -> _Surface:
         thing = original.evaluated_get(self._depsgraph)
@@ -158,7 +178,9 @@ class _Reader:
             parent = instance.parent
             if not instance.is_instance or parent is None or parent.original != original:
                 continue
-            if instance.object.type == "MESH" and np.allclose(np.array(instance.matrix_world), hit.matrix, atol=1e-5):
+            if instance.object.type == "MESH" and np.allclose(
+                np.array(instance.matrix_world), hit.matrix, atol=SAME_PLACE
+            ):
                 found.append(_Surface(instance.object, instance.object.data))
         return found
 

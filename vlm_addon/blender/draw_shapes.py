@@ -10,6 +10,15 @@ from ..core.scene import Float64
 
 Corners = list[list[int]]
 
+START_SHARE = 1e-3
+"""A path whose first point is within this share of the edge's half length of its middle begins there."""
+
+BEND_COSINE = 0.85
+"""Surfaces whose normals are less alike than this meet in a corner."""
+
+ACROSS_COSINE = 0.5
+"""Cosine between an edge and a corner from which the strip goes across it."""
+
 UPRIGHT = 0.9
 """Cosine with the world's z from which a surface counts as lying, so that its rectangles are aligned with x."""
 
@@ -36,25 +45,64 @@ def rectangle(
     return points, [[at, at + 1, at + columns + 2, at + columns + 1] for at in starts]
 
 
-def strip(edge: Float64, path: Float64, normals: Float64) -> tuple[Float64, Corners]:
-    """A strip of quads that the edge leaves as its middle goes along a path: points (v, 3), the edge's first, and
-    corners of each quad.
+def strip(edge: Float64, path: Float64, normals: Float64) -> tuple[Float64, Corners, Float64]:
+    """A strip of quads that the edge leaves as its middle goes along a path.
 
-    edge: (2, 3). path: (n, 3) places of the middle. normals: (n, 3) of the surface there: the edge turns with it, so
-    that it stays in the surface. Raises InvalidInput for a path that stays where it is.
+    edge: (2, 3). path: (n, 3) places of the middle; the first may be where it begins. normals: (n, 3) unit, of the
+    surface there: the edge turns with it, so that it stays in the surface, and where the path goes round a corner the
+    strip bends in it. Returns points (v, 3), the edge's first, corners of each quad, and (q, 3) where each faces.
+    Raises InvalidInput for an edge or a path without length.
     """
     half = 0.5 * (edge[1] - edge[0])
     length = float(np.linalg.norm(half))
     if not length > 0.0:
         raise InvalidInput("edge", "its two ends are one", "give two points")
-    points = [edge[0], edge[1]]
-    for middle, normal in zip(path, normals, strict=True):
-        turned = _in_plane(half, normal)
-        half = half if turned is None else length * turned
-        points += [middle - half, middle + half]
-    if len(points) == 2:
-        raise InvalidInput("path", "it has no points", "give at least one to extrude to")
-    return np.array(points), [[2 * at, 2 * at + 1, 2 * at + 3, 2 * at + 2] for at in range(len(path))]
+    middle, normal = edge.mean(axis=0), normals[0]
+    points, facing = [edge[0], edge[1]], []
+    for place, there in zip(path, normals, strict=True):
+        if np.linalg.norm(place - middle) <= START_SHARE * length:
+            normal = there
+            continue
+        bend = _corner(middle, normal, place, there, half) if normal @ there < BEND_COSINE else None
+        if bend is not None:
+            points += [bend[0] - bend[1], bend[0] + bend[1]]
+            facing.append(normal)
+            half = bend[1]
+        half = _turned(half, there)
+        points += [place - half, place + half]
+        facing.append(there)
+        middle, normal = place, there
+    if not facing:
+        raise InvalidInput("path", "it does not leave the edge", "give at least one point to extrude to")
+    quads = [[2 * at, 2 * at + 1, 2 * at + 3, 2 * at + 2] for at in range(len(facing))]
+    return np.array(points), quads, np.array(facing)
+
+
+def _turned(half: Float64, normal: Float64) -> Float64:
+    """`half` turned into the plane of `normal`, as long as it was."""
+    turned = _in_plane(half, normal)
+    return half if turned is None else float(np.linalg.norm(half)) * turned
+
+
+def _corner(
+    start: Float64, normal: Float64, end: Float64, other: Float64, half: Float64
+) -> tuple[Float64, Float64] | None:
+    """Middle and half edge in the line where the planes at both ends of a step meet; None where the strip does not go
+    across it, or it is beside the way."""
+    line = np.cross(normal, other)
+    sine = float(np.linalg.norm(line))
+    if sine == 0.0:
+        return None
+    line /= sine
+    share = float(half @ line) / float(np.linalg.norm(half))
+    if abs(share) < ACROSS_COSINE:
+        return None
+    rows = np.array([normal, other, line])
+    middle = np.linalg.solve(rows, [normal @ start, other @ end, line @ (0.5 * (start + end))])
+    step = float(np.linalg.norm(end - start))
+    if max(np.linalg.norm(middle - start), np.linalg.norm(middle - end)) > step:
+        return None
+    return middle, np.sign(share) * float(np.linalg.norm(half)) * line
 
 
 def simplified(outline: Float64, tolerance: float) -> list[int]:

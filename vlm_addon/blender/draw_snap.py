@@ -46,8 +46,8 @@ def place_under(
     return Place(location, normal, pixel, ring, what)
 
 
-def nearest_edge(view: View, pixel: Float64, edges: Float64, within: float) -> tuple[Float64, Float64] | None:
-    """Of (n, 2, 3) edges the one that shows nearest to the pixel, within so many pixels, and its point there."""
+def nearest_edge(view: View, pixel: Float64, edges: Float64, within: float) -> Float64 | None:
+    """(2, 3): of (n, 2, 3) edges the one that shows nearest to the pixel, within so many pixels."""
     if not len(edges):
         return None
     starts, ends = view.pixels(edges[:, 0]), view.pixels(edges[:, 1])
@@ -57,9 +57,7 @@ def nearest_edge(view: View, pixel: Float64, edges: Float64, within: float) -> t
     distances = np.linalg.norm(starts + shares[:, None] * ways - pixel, axis=1)
     distances = np.where(np.isnan(distances), np.inf, distances)
     best = int(np.argmin(distances))
-    if distances[best] > within:
-        return None
-    return edges[best], edges[best, 0] + shares[best] * (edges[best, 1] - edges[best, 0])
+    return edges[best] if distances[best] <= within else None
 
 
 def _snapped(view: View, pixel: Float64, location: Float64, ring: Float64, lights: Float64) -> tuple[Float64, str]:
