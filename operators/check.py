@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability
+from ..vlm_addon.blender import authoring, availability, checking
 from ..vlm_addon.blender.long_operator import LongOperator
 
 
@@ -19,10 +19,10 @@ class VLM_OT_check(LongOperator, Operator):  # noqa: N801 (Blender's naming of c
         return authoring.allow(cls, availability.check_problem(context))
 
     def prepare(self, context):
-        return authoring.check(context)
+        return checking.check(context)
 
     def finish(self, context, result):
-        authoring.list_checked(result)
+        checking.list_checked(result)
         for finding in result.findings:
             self.report({"WARNING"}, str(finding))
         self.report({"INFO"}, authoring.counted_findings(len(result.findings)))

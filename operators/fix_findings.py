@@ -4,7 +4,7 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, light_repair
+from ..vlm_addon.blender import authoring, availability, checking, light_repair
 from ..vlm_addon.blender.long_operator import LongOperator
 
 
@@ -30,11 +30,11 @@ as long as a check for each kind"""
         return light_repair.work_on(context, self._left.pop(0))
 
     def finish(self, context, result):
-        if isinstance(result, authoring.Checked):
-            authoring.list_checked(result)
+        if isinstance(result, checking.Checked):
+            checking.list_checked(result)
             return None
         told, more = light_repair.write_fixed(context, result)
         self.report({"INFO"}, told)
         if more is None:
-            more = light_repair.work_on(context, self._left.pop(0)) if self._left else authoring.check(context)
+            more = light_repair.work_on(context, self._left.pop(0)) if self._left else checking.check(context)
         return more

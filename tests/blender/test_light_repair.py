@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vlm_addon.bake import BakeSettings
-from vlm_addon.blender import authoring
+from vlm_addon.blender import authoring, checking
 from vlm_addon.blender.findings import fixable_kinds, marked_faces, select_offenders
 from vlm_addon.blender.light_faces import read_faces, write_faces
 from vlm_addon.blender.light_mesh_io import extract
@@ -31,7 +31,7 @@ def lights(make_cube):
 
 def check():
     """Kinds of what the check finds, as the scene keeps them."""
-    authoring.list_checked(authoring.check(bpy.context)(silent))
+    checking.list_checked(checking.check(bpy.context)(silent))
     return [item.kind for item in bpy.context.scene.vlm.findings if item.kind]
 
 

@@ -8,23 +8,24 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..bake import Bake, BakeSettings, bake
 from ..core.bake_key import surface_hashes
 from ..core.errors import InvalidInput, VlmError
+from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..core.tag_pairs import without_automatic
-from ..light_grid_bake import check_lights
 from . import animation
 from .availability import has_geometry, light_mesh_objects, rendered_objects
 from .bake_state import set_made_from
 from .engine import ENGINE_ID
 from .extract import ExtractOptions, extract_scene, require_camera, require_lights
 from .findings import list_findings
-from .light_grid_options import scene_grid_settings
+from .light_faces import write_faces
 from .light_mesh_io import Extraction, LightOrigins, extract, origins_of
-from .names import NAME, SOURCES_PROPERTY
+from .names import LOCK_ATTRIBUTE, NAME, SOURCES_PROPERTY
 from .source_faces import SourceFaces, read_source_faces
 from .source_tags import faces_to_tag, require_unchanged, write_face_tags
 from .write_back import write_light_mesh
@@ -46,6 +47,7 @@ class Made:
 
     name is None where the scene keeps the light meshes that it has, which are at `origins`. made_from: hashes of the
     surfaces, so that it can be told later whether they have changed. tagged: where new tags of them go, None without.
+    locked: how many lights, the first, were kept.
     """
 
     bake: Bake
@@ -55,14 +57,15 @@ class Made:
     origins: LightOrigins | None = None
     made_from: Mapping[str, str] = field(default_factory=dict)
     tagged: SourceFaces | None = None
+    locked: int = 0
 
 
 def from_selection(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
-    """Work that makes a light mesh of the selected objects. tag_regions: as for `_from_objects`."""
+    """Work that makes a light mesh of the selected objects. tag_regions: as for `from_objects`."""
     things = [thing for thing in context.selected_objects if has_geometry(thing)]
     active = context.active_object
     named_after = active if active in things else things[0]
-    return _from_objects(things, f"{NAME} {named_after.name}", settings, tag_regions)
+    return from_objects(things, f"{NAME} {named_after.name}", settings, tag_regions)
 
 
 def from_collection(collection: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
@@ -74,25 +77,29 @@ def from_collection(collection: Any, settings: BakeSettings, tag_regions: bool =
     if not things:
         problem = "none of its objects shows a surface in renders"
         raise InvalidInput(f"collection {collection.name!r}", problem, "put meshes into it, or choose another")
-    return _from_objects(things, f"{NAME} {collection.name}", settings, tag_regions)
+    return from_objects(things, f"{NAME} {collection.name}", settings, tag_regions)
 
 
 def from_scene(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
     """Work that makes one light mesh of all that the scene shows, whatever light meshes it has."""
     things = [thing for thing in rendered_objects(context) if has_geometry(thing)]
-    return _from_objects(things, NAME, settings, tag_regions)
+    return from_objects(things, NAME, settings, tag_regions)
 
 
-def _from_objects(
-    things: list[Any], name: str, settings: BakeSettings, tag_regions: bool
+def from_objects(
+    things: list[Any], name: str, settings: BakeSettings, tag_regions: bool, keep: VirtualLightMesh | None = None
 ) -> Callable[[Progress], Made]:
-    """tag_regions: let each face leave out just the lights that stand for it, as the simplification knows them."""
+    """Work that makes the light mesh `name` of objects.
+
+    tag_regions: let each face leave out just the lights that stand for it, as the simplification knows them. keep:
+    lights that stay as they are.
+    """
     sources = tuple(thing.name for thing in things)
     options = ExtractOptions(objects=frozenset(sources))
     if not tag_regions:
-        return _work(extract_scene(options), name, sources, settings)
+        return _work(extract_scene(options), name, sources, settings, None, keep)
     tagged = read_source_faces(options)
-    return _work(tagged.snapshot, name, sources, settings, tagged)
+    return _work(tagged.snapshot, name, sources, settings, tagged, keep)
 
 
 def from_visible_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
@@ -122,13 +129,16 @@ def _work(
     sources: tuple[str, ...],
     settings: BakeSettings,
     tagged: SourceFaces | None = None,
+    keep: VirtualLightMesh | None = None,
 ) -> Callable[[Progress], Made]:
+    locked = len(keep) if keep is not None else 0
     faces = faces_to_tag(tagged) if tagged is not None else None
     plain = replace(snapshot, meshes=tuple(map(without_automatic, snapshot.meshes)))
 
     def work(progress: Progress) -> Made:
-        made = bake(plain, None, settings, progress, faces)
-        return Made(made, snapshot.name, name, sources, made_from=surface_hashes(plain.meshes), tagged=tagged)
+        made = bake(plain, None, settings, progress, faces, keep)
+        hashes = surface_hashes(plain.meshes)
+        return Made(made, snapshot.name, name, sources, made_from=hashes, tagged=tagged, locked=locked)
 
     return work
 
@@ -147,6 +157,8 @@ def write(made: Made) -> str:
     written = write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
     if made.tagged is not None and made.bake.face_tags is not None:
         write_face_tags(made.tagged, made.bake.face_tags)
+    if made.locked:
+        write_faces(written, LOCK_ATTRIBUTE, np.arange(len(made.bake.light_mesh)) < made.locked)
     set_made_from(written, made.made_from)
     list_findings(scene, findings, origins_of(written))
     seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
@@ -166,57 +178,12 @@ def _counted_twice(scene: Any, made: Made) -> list[Finding]:
     return findings
 
 
-@dataclass(frozen=True)
-class Checked:
-    """What a check found, and where the lights that it names are stored."""
-
-    scene: str
-    findings: tuple[Finding, ...]
-    origins: LightOrigins | None
-
-
-def check(context: Any) -> Callable[[Progress], Checked]:
-    """Work that looks for what is wrong with the light meshes and the light grid of the scene, and what extraction had
-    to approximate."""
-    found = extract_edited(context)
-    settings = scene_grid_settings(context.scene)
-    budget = over_budget(context.scene, len(found.light_mesh or ()))
-    notes = (*budget, *animation.left_behind(context.scene), *found.snapshot.findings)
-
-    def work(progress: Progress) -> Checked:
-        findings = check_lights(found.snapshot, found.light_mesh, settings, progress)
-        return Checked(found.snapshot.name, (*findings, *notes), found.origins)
-
-    return work
-
-
-def list_checked(checked: Checked) -> None:
-    """Keep what a check found in its scene. Raises InvalidInput where that is gone."""
-    list_findings(require_scene(checked.scene), checked.findings, checked.origins)
-
-
 def require_scene(name: str) -> Any:
     """The scene of that name. Raises InvalidInput where it is gone."""
     scene = bpy.data.scenes.get(name)
     if scene is None:
         raise InvalidInput(f"scene {name!r}", "it is gone", "undo, or do it again in another scene")
     return scene
-
-
-def extract_edited(context: Any) -> Extraction:
-    """The scene with the meshes in edit mode as they are now, and lights with whatever values they have."""
-    for thing in context.objects_in_mode:
-        thing.update_from_editmode()
-    return extract(broken_values=True)
-
-
-def over_budget(scene: Any, count: int) -> list[Finding]:
-    """A finding where `count` lights are more than the scene's budget."""
-    budget = scene.vlm.light_budget
-    if not 0 < budget < count:
-        return []
-    problem = f"its light meshes have {lights(count)}, the budget is {budget:,}"
-    return [Finding(f"scene {scene.name!r}", problem, "create them again with fewer, delete some or raise the budget")]
 
 
 def render_picture(context: Any) -> None:

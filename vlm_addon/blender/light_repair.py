@@ -24,7 +24,8 @@ from ..core.progress import Progress
 from ..core.repair import Repair, fix
 from ..core.scene import Float64
 from ..core.validate import check_light_mesh
-from .authoring import extract_edited, lights
+from .authoring import lights
+from .checking import extract_edited
 from .findings import TAGGED, fixable, fixable_kinds
 from .light_faces import face_count, read_faces, write_faces
 from .light_mesh_io import LightOrigins

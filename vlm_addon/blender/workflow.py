@@ -35,6 +35,7 @@ CREATE = Step(
         ("create_from_selection", "RESTRICT_SELECT_OFF"),
         ("create_from_collection", "OUTLINER_COLLECTION"),
         ("create_from_scene", "SCENE_DATA"),
+        ("create_again", "FILE_REFRESH"),
     ),
 )
 DETAIL = Step(

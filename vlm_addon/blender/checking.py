@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looking for what is wrong with the scene's light meshes, in steps: read, look without Blender's data, list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ..core.progress import Progress
+from ..core.scene import Finding
+from ..light_grid_bake import check_lights
+from . import animation
+from .authoring import lights, require_scene
+from .findings import list_findings
+from .light_grid_options import scene_grid_settings
+from .light_mesh_io import Extraction, LightOrigins, extract
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check found, and where the lights that it names are stored."""
+
+    scene: str
+    findings: tuple[Finding, ...]
+    origins: LightOrigins | None
+
+
+def check(context: Any) -> Callable[[Progress], Checked]:
+    """Work that looks for what is wrong with the light meshes and the light grid of the scene, and what extraction had
+    to approximate."""
+    found = extract_edited(context)
+    settings = scene_grid_settings(context.scene)
+    budget = over_budget(context.scene, len(found.light_mesh or ()))
+    notes = (*budget, *animation.left_behind(context.scene), *found.snapshot.findings)
+
+    def work(progress: Progress) -> Checked:
+        findings = check_lights(found.snapshot, found.light_mesh, settings, progress)
+        return Checked(found.snapshot.name, (*findings, *notes), found.origins)
+
+    return work
+
+
+def list_checked(checked: Checked) -> None:
+    """Keep what a check found in its scene. Raises InvalidInput where that is gone."""
+    list_findings(require_scene(checked.scene), checked.findings, checked.origins)
+
+
+def extract_edited(context: Any) -> Extraction:
+    """The scene with the meshes in edit mode as they are now, and lights with whatever values they have."""
+    for thing in context.objects_in_mode:
+        thing.update_from_editmode()
+    return extract(broken_values=True)
+
+
+def over_budget(scene: Any, count: int) -> list[Finding]:
+    """A finding where `count` lights are more than the scene's budget."""
+    budget = scene.vlm.light_budget
+    if not 0 < budget < count:
+        return []
+    problem = f"its light meshes have {lights(count)}, the budget is {budget:,}"
+    return [Finding(f"scene {scene.name!r}", problem, "create them again with fewer, delete some or raise the budget")]
