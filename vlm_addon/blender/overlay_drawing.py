@@ -9,10 +9,12 @@ from typing import Any
 
 import bpy
 import numpy as np
+import numpy.typing as npt
 from mathutils import Matrix
 
 from ..core.grid_samples import Cells, GridView, cells_around, look, slice_cells
 from ..core.light_grid import RANGE
+from ..core.scene import Float64
 from .light_grid_options import scene_grid_settings
 from .light_meshes import light_meshes
 from .names import HUE_PROPERTY, STRENGTH_PROPERTY, TAG_PROPERTY, is_light_mesh
@@ -29,6 +31,8 @@ from .overlay_shapes import (
     world_faces,
 )
 
+Bools = npt.NDArray[np.bool_]
+
 LINE_PIXELS = 1.5
 NEARER = 0.02
 """Share of their distance by which overlays are drawn nearer to the eye: lights lie behind what is visible."""
@@ -36,7 +40,6 @@ SURFACE_NEARER = 0.001
 STRIPE_PIXELS = 6.0
 CURSOR_REACH = 2
 """Cells around the 3D cursor along each axis."""
-LABEL_REACH = 1
 LABEL_SIZE = 12
 TAGGED_SURFACES, GRID = "tagged surfaces", "light grid"
 AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -47,14 +50,15 @@ void main() {
     gl_Position = matrix * vec4(pos, 1.0);
 }
 """
-# Backs are striped and darker: lights shine on their front only.
+# Backs are striped and darker: lights shine on their front only. The 3D view takes linear values.
 _FRAGMENT = """
 void main() {
+    vec3 linear = mix(shade.rgb / 12.92, pow((shade.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, shade.rgb));
     bool is_stripe = mod(gl_FragCoord.x + gl_FragCoord.y, 2.0 * stripe) < stripe;
     if (!gl_FrontFacing && stripe > 0.0) {
-        result = is_stripe ? vec4(0.0, 0.0, 0.0, shade.a) : vec4(0.5 * shade.rgb, 0.5 * shade.a);
+        result = is_stripe ? vec4(0.0, 0.0, 0.0, shade.a) : vec4(0.2 * linear, 0.5 * shade.a);
     } else {
-        result = shade;
+        result = vec4(linear, shade.a);
     }
 }
 """
@@ -238,20 +242,36 @@ class OverlayDrawing:
         return self._shader
 
     def _paint(self, gpu: Any, context: Any, part: _Part, depth_test: str, nearer: float, stripe: float) -> None:
+        """stripe: width of the stripes on backs in pixels, 0 for backs that look like fronts."""
         gpu.state.depth_test_set(depth_test)
+        projection, view = gpu.matrix.get_projection_matrix(), gpu.matrix.get_model_view_matrix()
+        moved = _nearer(context.region_data, nearer) @ view
+        for is_lines, batch in part.batches:
+            if is_lines:
+                self._paint_lines(gpu, context, batch, moved)
+            elif stripe > 0.0:
+                # Backs stay where they are: nearer, those at the rim of a body would show through its front.
+                self._paint_faces(gpu, batch, projection @ view, stripe, "FRONT")
+                self._paint_faces(gpu, batch, projection @ moved, stripe, "BACK")
+            else:
+                self._paint_faces(gpu, batch, projection @ moved, stripe, "NONE")
+
+    def _paint_lines(self, gpu: Any, context: Any, batch: Any, view: Matrix) -> None:
         with gpu.matrix.push_pop():
-            gpu.matrix.load_matrix(_nearer(context.region_data, nearer) @ gpu.matrix.get_model_view_matrix())
-            matrix = gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix()
-            for is_lines, batch in part.batches:
-                if is_lines:
-                    shader = gpu.shader.from_builtin("POLYLINE_FLAT_COLOR")
-                    shader.uniform_float("viewportSize", (context.region.width, context.region.height))
-                    shader.uniform_float("lineWidth", LINE_PIXELS * context.preferences.system.pixel_size)
-                else:
-                    shader = self._face_shader()
-                    shader.uniform_float("matrix", matrix)
-                    shader.uniform_float("stripe", stripe)
-                batch.draw(shader)
+            gpu.matrix.load_matrix(view)
+            shader = gpu.shader.from_builtin("POLYLINE_FLAT_COLOR")
+            shader.uniform_float("viewportSize", (context.region.width, context.region.height))
+            shader.uniform_float("lineWidth", LINE_PIXELS * context.preferences.system.pixel_size)
+            batch.draw(shader)
+
+    def _paint_faces(self, gpu: Any, batch: Any, matrix: Matrix, stripe: float, left_out: str) -> None:
+        """left_out: the side that is not drawn."""
+        shader = self._face_shader()
+        shader.uniform_float("matrix", matrix)
+        shader.uniform_float("stripe", stripe)
+        gpu.state.face_culling_set(left_out)
+        batch.draw(shader)
+        gpu.state.face_culling_set("NONE")
 
     def _label(self) -> None:
         """Numbers in the cells next to the 3D cursor."""
@@ -267,8 +287,7 @@ class OverlayDrawing:
         cells = self.cells(context.scene, settings.grid_place)
         assert cells is not None
         middles = cells.corners.mean(axis=1)
-        size = np.ptp(cells.corners, axis=1).max(initial=0.0)
-        near = np.abs(middles - np.array(context.scene.cursor.location)).max(axis=1) <= (LABEL_REACH + 0.5) * size
+        near = _layer_towards(context.region_data, cells, np.array(context.scene.cursor.location))
         blf.size(0, LABEL_SIZE * context.preferences.system.ui_scale)
         blf.color(0, 1.0, 1.0, 1.0, 1.0)
         for row in np.flatnonzero(near & (cells.counts > 0)):
@@ -276,6 +295,15 @@ class OverlayDrawing:
             if place is not None:
                 blf.position(0, place.x, place.y, 0.0)
                 blf.draw(0, cell_text(cells, int(row)))
+
+
+def _layer_towards(region_data: Any, cells: Cells, cursor: Float64) -> Bools:
+    """(c,) cells of the layer of the 3D cursor that one looks at most directly: numbers behind others are no use."""
+    axis = int(np.abs(np.array(region_data.view_matrix)[2, :3]).argmax())
+    middles = cells.corners.mean(axis=1)[:, axis]
+    nearest = np.abs(middles - cursor[axis]).min(initial=np.inf)
+    half = 0.5 * np.ptp(cells.corners[:, :, axis], axis=1).max(initial=0.0)
+    return np.asarray(np.abs(middles - cursor[axis]) < nearest + half)
 
 
 def cell_text(cells: Cells, row: int) -> str:

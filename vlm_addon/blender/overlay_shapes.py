@@ -36,6 +36,8 @@ UNTAGGED_COLOR = (0.35, 0.35, 0.35)
 LINE_COLOR, NORMAL_COLOR = (0.05, 0.05, 0.05, 0.8), (1.0, 0.85, 0.2, 1.0)
 HALF_BALL_COLOR = (0.2, 0.7, 1.0, 0.6)
 FINDING_COLOR = (1.0, 0.1, 0.1, 1.0)
+BOX_SHARE = 0.85
+"""Of a cell's edges that its box has, so that neighbours' do not cover each other."""
 MOST_HALF_BALLS = 200
 """More cannot be told apart."""
 
@@ -157,7 +159,8 @@ def cell_shapes(cells: Cells, tolerance: float, is_slice: bool, axis: int, alpha
     colors, corners = heat_colors(shares)[shown], cells.corners[shown]
     if not is_slice:
         rgba = np.column_stack([np.repeat(colors[None], 12, axis=0).reshape(-1, 3), np.full(12 * len(colors), 0.7)])
-        return [lines(box_lines(corners), rgba)]
+        middles = corners.mean(axis=1, keepdims=True)
+        return [lines(box_lines(middles + BOX_SHARE * (corners - middles)), rgba)]
     return [triangles(_layer(corners, axis), np.repeat(colors, 2, axis=0), alpha)]
 
 

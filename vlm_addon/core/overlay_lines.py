@@ -9,7 +9,7 @@ from .scene import Float64, Int32
 
 NORMAL_LENGTH = 0.35
 """Of the line that shows which side shines, in square roots of its face's area."""
-_ARC_STEPS = 16
+_ARC_STEPS = 32
 
 
 def outlines(corners: Float64, faces: Int32) -> Float64:
