@@ -44,7 +44,7 @@ def test_every_operator_has_a_german_label_and_tooltip():
 
 
 def test_every_panel_has_a_german_title():
-    titles = {panel.bl_label for panel in (*panels.CLASSES, *render_panels.CLASSES)}
+    titles = {panel.bl_label for panel in (*panels.CLASSES, *panels.LAST_CLASSES, *render_panels.CLASSES)}
     assert sorted(titles - set(german.LABELS)) == []
 
 

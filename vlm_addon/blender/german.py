@@ -49,7 +49,8 @@ OPERATORS = {
     ),
     "vlm.create_from_scene": (
         "Aus Szene erstellen",
-        "Virtuelle Lichter machen, die für das reflektierte Licht von allem stehen, was die Szene zeigt, in einem Lichtnetz",
+        "Virtuelle Lichter machen, die für das reflektierte Licht von allem stehen, was die Szene zeigt, in einem "
+        "Lichtnetz",
     ),
     "vlm.create_from_selection": (
         "Aus Auswahl erstellen",
@@ -161,6 +162,11 @@ OPERATORS = {
         "Farbton verschieben",
         "Den Farbton der gewählten Lichter drehen; jedes sendet so viel Licht aus wie zuvor",
     ),
+    "vlm.show_light_grid": (
+        "Lichtgitter zeigen",
+        "Das Lichtgitter neu machen und seine Zellen zeigen: wie viele Lichter zählen, oder wie weit das Licht "
+        "abweichen darf",
+    ),
     "vlm.show_licences": (
         "Lizenzen",
         "Die Lizenzen der Erweiterung und der mitgelieferten Software auflisten",
@@ -189,6 +195,8 @@ OPERATORS = {
 BUTTONS = {
     "Render Image": "Bild rendern",
     "Select": "Auswählen",
+    "Fix": "Beheben",
+    "Fix All": "Alles beheben",
 }
 """Texts of buttons that differ from their operator's label, by the English ones."""
 
@@ -216,26 +224,36 @@ LABELS = {
 
 PROPERTIES = {
     "Ambient occlusion": "Umgebungsverdeckung",
+    "Cells": "Zellen",
     "Direct light": "Direktes Licht",
     "Exact Reach": "Genaue Reichweite",
+    "Fill": "Füllung",
     "Filter": "Filter",
     "Filter Cosine": "Filterkosinus",
     "Filter Distance": "Filterabstand",
+    "Findings": "Befunde",
     "Findings of the last check": "Befunde der letzten Prüfung",
     "Grid": "Gitter",
     "Highlights": "Glanzlichter",
+    "In Front": "Im Vordergrund",
     "Indirect light": "Indirektes Licht",
     "Layered materials": "Geschichtete Materialien",
     "Light Budget": "Lichtbudget",
+    "Light Grid": "Lichtgitter",
+    "Light Mesh Overlays": "Überlagerungen der Lichtnetze",
     "Light mesh reflection": "Spiegelung des Lichtnetzes",
     "Lights": "Lichter",
     "Map reflection": "Spiegelung aus Karten",
     "Max Lights": "Höchstzahl der Lichter",
     "Octree Resolution": "Auflösung des Octrees",
+    "Opacity": "Deckkraft",
     "Range": "Reichweite",
+    "Reach": "Reichweite",
     "Samples": "Abtastwerte",
     "Screen reflection": "Spiegelung aus dem Bild",
     "Shadows": "Schatten",
+    "Shining Side": "Leuchtende Seite",
+    "Tag Regions": "Bereiche kennzeichnen",
     "Target Triangles": "Anzahl der Lichter",
     "Technique": "Verfahren",
     "Temporal accumulation": "Zeitliche Mittelung",
@@ -248,4 +266,4 @@ PROPERTIES = {
     "World Lights": "Lichter der Welt",
     "World lights": "Lichter der Welt",
 }
-"""Names of settings that the scene keeps, by the English ones."""
+"""Names of settings of the scene, the views and operators, by the English ones."""
