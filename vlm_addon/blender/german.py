@@ -43,6 +43,11 @@ OPERATORS = {
         "Versionen, Gerät, Einstellungen und die letzten Zeilen im Protokoll des Renderers kopieren, ohne "
         "Namen von Dateien und Objekten",
     ),
+    "vlm.create_again": (
+        "Neu erstellen",
+        "Das aktive Lichtnetz aus den Objekten neu machen, aus denen es gemacht ist; gesperrte Lichter bleiben, wie "
+        "sie sind",
+    ),
     "vlm.create_from_collection": (
         "Aus Sammlung erstellen",
         "Virtuelle Lichter machen, die für das reflektierte Licht der Objekte einer Sammlung stehen",
