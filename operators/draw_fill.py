@@ -7,7 +7,7 @@ from ..vlm_addon.blender import authoring, draw_fill, draw_operators
 
 
 class VLM_OT_draw_fill(draw_operators.NewLights, Operator):  # noqa: N801 (Blender's naming of classes)
-    """Copy the selected faces of the visible mesh as lights behind them, with colour and tag of the surface"""
+    """Copy selected faces of visible meshes as lights behind them, with their colour and tag. Leaves Edit Mode"""
 
     bl_idname = "vlm.draw_fill"
     bl_label = "Lights from Selected Faces"

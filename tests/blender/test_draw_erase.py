@@ -184,7 +184,7 @@ def test_filling_again_adds_to_the_light_mesh_of_the_object(make_cube):
     cube = make_cube()
     choose_faces(cube, [0], "EDIT")
     fill(bpy.context)
-    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.context.mode == "OBJECT", "undo in edit mode would leave the lights"
     for thing in bpy.context.selected_objects:
         thing.select_set(False)
     choose_faces(cube, [1], "EDIT")

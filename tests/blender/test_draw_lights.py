@@ -336,3 +336,13 @@ def test_what_has_no_area_is_refused_and_nothing_is_made(red_plane, points, mess
 def test_a_target_that_is_no_light_mesh_is_refused(red_plane):
     with pytest.raises(InvalidInput, match="no light mesh"):
         draw(SQUARE, target="Plane")
+
+
+def test_in_edit_mode_another_light_mesh_is_refused(red_plane):
+    first = draw(SQUARE)
+    bpy.context.view_layer.objects.active = None
+    draw(SQUARE + np.array([1.0, 0.0, 0.0]))
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(InvalidInput, match="not the one in edit mode"):
+        draw(SQUARE - np.array([1.0, 0.0, 0.0]), target=first.name)
+    assert len(first.data.polygons) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import bpy
 import numpy as np
 
 from ..core.errors import InvalidInput
@@ -32,7 +33,8 @@ def fill(context: Any, target: str = "") -> str:
     """Make lights of the selected faces of the visible meshes, set behind them; returns a sentence with counts.
 
     They go into the light mesh `target`; by default into the active one, or one that has lights of the same object, or
-    a new one. Linked meshes are only read. Raises InvalidInput; nothing is changed then.
+    a new one. Linked meshes are only read. Edit mode is left: its undo knows the edited meshes alone. Raises
+    InvalidInput; nothing is changed then.
     """
     things = fill_sources(context)
     thing = find_target(context, target) or _light_mesh_of(things, context.scene)
@@ -42,6 +44,8 @@ def fill(context: Any, target: str = "") -> str:
         problem = "no face of the selected meshes is selected"
         raise InvalidInput("selection", problem, "select faces in edit mode (Tab, then 3)")
     made = _joined(parts)
+    if context.mode == "EDIT_MESH":
+        bpy.ops.object.mode_set(mode="OBJECT")
     written, added = write_lights(context, made, thing)
     if not added:
         raise InvalidInput("selection", "all of its faces have their light already", "select others")

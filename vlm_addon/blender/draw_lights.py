@@ -69,6 +69,9 @@ def draw(
     the light mesh become these vertices. Raises InvalidInput; nothing is changed then.
     """
     thing = find_target(context, target)
+    if context.mode == "EDIT_MESH" and (thing is None or thing.mode != "EDIT"):
+        # Its undo would leave them.
+        raise InvalidInput("light mesh", "it is not the one in edit mode", "leave edit mode, or name the one in it")
     faces = faces_of(points, corners, normals)
     made = worked_out(context, faces, offset, thing)
     written, added = write_lights(context, made, thing)
