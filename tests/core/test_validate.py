@@ -168,7 +168,6 @@ def test_thin_body_is_told_apart_from_what_can_be_moved_and_tags_excuse_it() -> 
     repair = fix(kinds.THIN, created.light_mesh, shell, np.arange(len(created.light_mesh)))
     after = faults(repair.applied(created.light_mesh), list(repair.applied_to(shell)))
     assert kinds.THIN not in after
-    assert kinds.IN_FRONT not in after
 
 
 def test_sheet_in_the_open_is_told_until_it_has_tags() -> None:

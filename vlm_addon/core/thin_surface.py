@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,8 @@ from .placement import STEEPEST_COSINE, THICKNESS_SHARE, insets
 from .sampling import square_to_triangle
 from .scene import Float64, Int32, Mesh
 from .triangle_tree import TriangleTree, build_tree
+
+Lights = npt.NDArray[np.integer[Any]]
 
 # Rays from the back of each light's region that look for what sees it from behind.
 BACK_RAYS = 16
@@ -65,7 +68,7 @@ def thin_triangles(
     return ThinSurface(tuple(np.split(thin, at)), tuple(np.split(seen, at)))
 
 
-def thin_against(light_corners: Float64, lights: Int32, corners: Float64, tree: TriangleTree) -> Bool:
+def thin_against(light_corners: Float64, lights: Lights, corners: Float64, tree: TriangleTree) -> Bool:
     """(t,) whether each source triangle (t, 3, 3) belongs to a region that bulges inwards by more than its body allows.
 
     The bulge of a region is the height that its corners span over the plane of its light. lights: (t,), -1 for none.
@@ -106,7 +109,7 @@ def open_triangles(meshes: Sequence[Mesh]) -> Bool:
     return np.concatenate(parts) if parts else np.zeros(0, bool)
 
 
-def two_sided(lights: Int32, corners: Float64, is_open: Bool, tree: TriangleTree) -> Bool:
+def two_sided(lights: Lights, corners: Float64, is_open: Bool, tree: TriangleTree) -> Bool:
     """(t,) triangles of sheets whose back some surface faces: by BACK_RAYS rays from the back of each region.
 
     Only triangles of `is_open` count. What lies inside of an open body meets backs of its own and is not seen.

@@ -14,12 +14,12 @@ from . import finding_kinds as kinds
 from .light_links import leaves_out
 from .light_mesh import VirtualLightMesh
 from .light_overlaps import badly_joined, covered_twice
-from .mesh_topology import Bool, sum_by
+from .mesh_topology import Bool, Int64, rows_by_key, sum_by
 from .nearest_lights import light_of_triangles
 from .placement import insets
 from .scene import Finding, Float64, Int32, Mesh
 from .thin_surface import open_triangles, thin_against, two_sided
-from .triangle_tree import build_tree
+from .triangle_tree import TriangleTree, build_tree
 
 Rows = npt.NDArray[Any]
 
@@ -29,6 +29,8 @@ LEAST_QUALITY = 1e-6
 # Depth in front of the source surface that counts, as a share of the size (square root of the area) of the light.
 NOTICEABLE_DEPTH = 1e-3
 NOTICEABLE_SHARE = 0.01
+# Triangles of each region at which the thickness of the body is looked for, or up to twice as many.
+THICKNESS_PLACES = 24
 # Mean cosine between a light and its source samples below which it counts as inside out: a light that stands for a
 # small knob may well have a mean about zero, a flipped one has nearly -1.
 INSIDE_OUT_COSINE = -0.3
@@ -52,30 +54,67 @@ def check_light_mesh(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh] = ()) 
 
 @dataclass(frozen=True)
 class _Surface:
-    """The visible surface as far as tags matter: each light is the nearest one of its triangles. excused: (n,) share by
-    area of the region of each light that leaves it out. thin, two_sided: (n,) such shares of what does not."""
+    """The visible surface, each triangle with the nearest light. corners: (t, 3, 3). left_out: (t,) bool, whether tags
+    or links leave out that light. is_open: (t,) bool, of a shell with a border."""
 
-    excused: Float64
-    thin: Float64
-    two_sided: Float64
+    light_mesh: VirtualLightMesh
+    corners: Float64
+    lights: Int64
+    left_out: Bool
+    is_open: Bool
+
+    def excused(self) -> Bool:
+        """(n,) lights that their whole region leaves out."""
+        return self._share(self.left_out, self.lights >= 0) >= 1.0 - NOTICEABLE_SHARE
+
+    def thin(self, chosen: Bool) -> Bool:
+        """(n,) those of the chosen lights whose body is too thin for them, by some triangles of each."""
+        asked = self._some(chosen)
+        lights = np.where(asked, self.lights, -1)
+        thin = thin_against(self.light_mesh.corners, lights, self.corners, self._tree())
+        return self._share(thin, asked) > NOTICEABLE_SHARE
+
+    def two_sided(self) -> Bool:
+        """(n,) lights that stand for sheets seen from both sides."""
+        lights = np.where(self.left_out, -1, self.lights)
+        if not (self.is_open & (lights >= 0)).any():
+            return np.zeros(len(self.light_mesh), bool)
+        seen = two_sided(lights, self.corners, self.is_open, self._tree())
+        return self._share(seen, self.lights >= 0) > NOTICEABLE_SHARE
+
+    def _tree(self) -> TriangleTree:
+        return build_tree(self.corners)
+
+    def _some(self, chosen: Bool) -> Bool:
+        """(t,) up to THICKNESS_PLACES triangles of the region of each chosen light, evenly by row."""
+        rows = np.flatnonzero(chosen[self.lights] & ~self.left_out)
+        regions = rows_by_key(self.lights[rows], len(chosen), rows)
+        owner = np.repeat(np.arange(len(chosen)), regions.lengths)
+        place = np.arange(len(owner)) - regions.starts[owner]
+        step = np.maximum(regions.lengths[owner] // THICKNESS_PLACES, 1)
+        some = np.zeros(len(self.lights), bool)
+        some[regions.values[place % step == 0]] = True
+        return some
+
+    def _share(self, chosen: Bool, among: Bool) -> Float64:
+        """(n,) share by area of the chosen triangles among some of each region."""
+        corners = self.corners
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        whole, part = (sum_by(self.lights, area * each, len(self.light_mesh)) for each in (among, chosen & among))
+        share: Float64 = part / np.maximum(whole, np.finfo(float).tiny)
+        return share
 
 
 def _surface(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> _Surface:
     filled = [mesh for mesh in meshes if len(mesh.triangles)]
-    count = len(light_mesh)
     if not filled:
-        return _Surface(np.zeros(count), np.zeros(count), np.zeros(count))
+        none = np.zeros(0, bool)
+        return _Surface(light_mesh, np.zeros((0, 3, 3)), np.zeros(0, np.int64), none, none)
     corners = np.concatenate([mesh.positions[mesh.triangles] for mesh in filled])
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     lights = light_of_triangles(light_mesh.corners, corners).astype(np.int64)
     tags = np.concatenate([mesh.tag_ids for mesh in filled])
     left_out = leaves_out(light_mesh.links, light_mesh.tag_ids[lights], tags)
-    tree = build_tree(corners)
-    asked = np.where(left_out, -1, lights).astype(np.int32)
-    thin = thin_against(light_mesh.corners, asked, corners, tree)
-    seen = two_sided(asked, corners, open_triangles(filled), tree)
-    total = np.maximum(sum_by(lights, area, count), np.finfo(float).tiny)
-    return _Surface(*(sum_by(lights, area * chosen, count) / total for chosen in (left_out, thin, seen)))
+    return _Surface(light_mesh, corners, lights, left_out, open_triangles(filled))
 
 
 def _broken(light_mesh: VirtualLightMesh) -> list[Finding]:
@@ -193,10 +232,9 @@ def _in_front(light_mesh: VirtualLightMesh, normal: Float64) -> tuple[Float64, F
 
 def _depth_findings(share: Float64, depth: Float64, surface: _Surface) -> list[Finding]:
     """What stands in front, apart where the body is too thin to move it (figure 3.7) or has no inside (figure 3.6)."""
-    open_ = surface.excused < 1.0 - NOTICEABLE_SHARE
-    stands = (share > NOTICEABLE_SHARE) & open_
-    thin = stands & (surface.thin > NOTICEABLE_SHARE)
-    seen = open_ & (surface.two_sided > NOTICEABLE_SHARE)
+    stands = (share > NOTICEABLE_SHARE) & ~surface.excused()
+    thin = stands & surface.thin(stands)
+    seen = surface.two_sided()
     found = []
     movable = stands & ~thin
     remedy = "move them behind it, or give both a common tag where the body is thin"

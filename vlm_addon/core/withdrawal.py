@@ -10,6 +10,7 @@ the back of the surface first.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ from .scene import Float64
 from .triangle_tree import TriangleTree, build_tree
 
 # Points of each region at which its own light is measured, first of all lights, then of those that may withdraw.
-ROUGH_POINTS, FINE_POINTS = 16, 48
+ROUGH_POINTS, FINE_POINTS = 16, 32
 # Mean share of a light's radiosity that its own region may receive.
 ALLOWED = 5e-3
 # Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
@@ -32,7 +33,9 @@ DEPTHS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.6)
 LEAST_AREA_SHARE = 1.0 / 48.0
 # Length of the mean normal of a region below which it faces nowhere.
 LEAST_FACING = 0.05
-LIGHTS_PER_BATCH = 256
+# So many of the best places are looked at whether they are inside; then the light stays where it is.
+ATTEMPTS = 24
+LIGHTS_PER_BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -46,11 +49,18 @@ class Withdrawal:
     own: Float64
 
 
-def withdraw(positions: Float64, triangles: Int64, regions: Rows, source_corners: Float64) -> Withdrawal:
+def withdraw(
+    positions: Float64,
+    triangles: Int64,
+    regions: Rows,
+    source_corners: Float64,
+    report: Callable[[float], None] = lambda share: None,
+) -> Withdrawal:
     """The lights, those with own light moved to where they give less, as far as there is such a place.
 
     positions: (v, 3), m. triangles: (n, 3). regions: source triangles of each light, rows of source_corners (t, 3, 3),
-    m. A light that moves gets vertices of its own after the others; vertices without any light are left out.
+    m. A light that moves gets vertices of its own after the others; vertices without any light are left out. report:
+    called with the share of the work that is done, may raise.
     """
     corners = positions[triangles]
     own = own_shares(corners, regions, source_corners, ROUGH_POINTS)
@@ -61,6 +71,7 @@ def withdraw(positions: Float64, triangles: Int64, regions: Rows, source_corners
     tree = build_tree(source_corners)
     inset = insets(corners)
     for first in range(0, len(offenders), LIGHTS_PER_BATCH):
+        report(first / len(offenders))
         rows = offenders[first : first + LIGHTS_PER_BATCH]
         part = _rows_of(regions, rows)
         placed, left = _best_places(corners[rows], inset[rows], part, source_corners, tree)
@@ -115,7 +126,7 @@ def _best_places(
     free = np.flatnonzero(~_inside(corners, span, tree))
     best, left = np.zeros(count, np.int64), np.full(count, np.inf)
     order, open_rows = np.argsort(score, axis=1, kind="stable"), np.arange(count)
-    for attempt in range(each):
+    for attempt in range(min(ATTEMPTS, each)):
         choice = order[open_rows, attempt]
         allowed = shallow[choice] & np.isin(open_rows, free)
         asked = np.flatnonzero(~allowed)
