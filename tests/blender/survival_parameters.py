@@ -49,7 +49,10 @@ def operator_names():
 
 
 def parameters(name, random):
-    """A value for some of the operator's properties; the others keep their defaults."""
+    """Values of the operator's properties, some random, the others their defaults.
+
+    None is left out: Blender gives those the values of the last call where a call adds an undo step.
+    """
     made = OWN.get(name)
     if made is not None:
         return made(random)
@@ -60,7 +63,15 @@ def parameters(name, random):
             found[each.identifier] = BUDGETS[each.identifier](random)
         elif not each.is_readonly and each.type in VALUES and random.random() < 0.7:
             found[each.identifier] = VALUES[each.type](each, random)
+        elif not each.is_readonly and each.type in (*VALUES, "STRING"):
+            found[each.identifier] = _default(each)
     return found
+
+
+def _default(each):
+    if each.type == "ENUM" and each.is_enum_flag:
+        return each.default_flag
+    return list(each.default_array) if getattr(each, "is_array", False) else each.default
 
 
 def _number(each, random, draw, smallest, largest):

@@ -218,11 +218,16 @@ def _light_mesh_faults(thing, scene, light_meshes_module):
         same = [each for each in there if each.get("vlm_id", 0) in (0, number)]
         if source is None and same:
             found.append(f"{thing.name!r} does not find its source {same[0].name!r}")
-        elif source is not None and there and source not in there:
+        elif source is not None and there and source not in there and not _is_copy(source, there, number):
             found.append(f"{thing.name!r} takes {source.name!r} for its source {there[0].name!r}")
         elif source is not None and not there and NO_MARK not in (mark, origin) and source.get(ORIGIN) != origin:
             found.append(f"{thing.name!r} takes {source.name!r} for a source that is gone")
     return found
+
+
+def _is_copy(source, there, number):
+    """Whether an object shares its id with the right ones, as appended and duplicated copies do: its name decides."""
+    return source.get("vlm_id") == number and any(each.get("vlm_id") == number for each in there)
 
 
 def _attribute_faults(mesh):
@@ -251,7 +256,7 @@ def shared_tags():
     """
     carriers = defaultdict(list)
     for thing in bpy.data.objects:
-        if is_light_mesh(thing) and thing.data is not None and not thing.data.is_editmode and marks_of(thing):
+        if is_light_mesh(thing) and thing.data is not None and not thing.data.is_editmode and _origins(thing):
             attribute = thing.data.attributes.get("vlm_tag")
             tags = np.frombuffer(_bytes(attribute), np.int32) if attribute else ()
             for tag in {int(each) for each in tags} - {0}:
@@ -259,8 +264,13 @@ def shared_tags():
     return {
         tag: sorted(thing.name for thing in things)
         for tag, things in carriers.items()
-        if len(_families([set(marks_of(thing)) for thing in things])) > 1
+        if len(_families([_origins(thing) for thing in things])) > 1
     }
+
+
+def _origins(thing):
+    """The origins of a light mesh's sources."""
+    return {origin for origin in str(thing.get(ORIGINS, "")).split("\n") if origin and origin != NO_MARK}
 
 
 def _families(groups):
