@@ -114,6 +114,8 @@ class ModalStroke:
         self._clean_up(context)
 
     def _handled(self, context: Any, event: Any) -> set[str]:
+        if context.area is None:
+            return CANCELLED  # the view was closed or another workspace shown
         action = self._keys.action(event)
         if action == SNAP:
             self._inverted = event.value == "PRESS"
@@ -180,6 +182,7 @@ class ModalStroke:
 
     def _finish(self, context: Any) -> set[str]:
         if len(self._places) < self.least_points:
+            self.report({"WARNING"}, f"Nothing done: {len(self._places)} of at least {self.least_points} points")
             return CANCELLED
         self.store(self._places, self._dragged)
         return self.execute(context)
