@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vlm_addon.core import tag_pairs
+from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out, no_links
 from vlm_addon.core.tag_pairs import TagUse, add_tags, related, unpaired
 
@@ -80,3 +82,24 @@ def test_no_pairs_change_nothing(count):
     found = add_tags([], [], light_tags, light_tags, no_links(), FIRST)
     assert found.light_tags.tolist() == found.face_tags.tolist() == light_tags.tolist()
     assert found.links.shape == (0, 2)
+
+
+def test_too_many_links_are_avoided_by_sharing_tags_within_a_group_and_no_pair_is_lost(monkeypatch):
+    pairs = np.array([(light, face) for face in range(FACES) for light in (face, face + 1)])
+    exact = add_tags(*pairs.T, *NONE, no_links(), FIRST)
+    assert len(exact.links) == 10
+    for most, groups in ((9, [0, 0, 0, 0, 0]), (7, [0, 0, 0, 1, 1])):
+        monkeypatch.setattr(tag_pairs, "MOST_LINKS", most)
+        shared = add_tags(*pairs.T, *NONE, no_links(), FIRST, groups)
+        assert len(shared.links) <= most
+        assert not unpaired(*pairs.T, shared.light_tags, shared.face_tags, shared.links).any()
+        # What is left out besides is of lights of the same group.
+        for face in range(FACES):
+            lights = {
+                pair[0] for pair in left_out(shared.light_tags, shared.face_tags, shared.links) if pair[1] == face
+            }
+            of_group = {light for light, other in pairs.tolist() if groups[other] == groups[face]}
+            assert lights <= of_group
+    monkeypatch.setattr(tag_pairs, "MOST_LINKS", 9)
+    with pytest.raises(InvalidInput, match="more than 9 links"):
+        add_tags(*pairs.T, *NONE, no_links(), FIRST)

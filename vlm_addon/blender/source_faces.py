@@ -59,6 +59,11 @@ class SourceFaces:
     read_only: tuple[str, ...]
     as_wholes: tuple[str, ...]
 
+    @property
+    def groups(self) -> Int64:
+        """(rows,) index into `places` of each row."""
+        return np.repeat(np.arange(len(self.places)), [place.count for place in self.places])
+
     def place_of(self, rows: npt.ArrayLike) -> Int64:
         """Index into `places` of each row."""
         ends = [place.first + place.count for place in self.places]

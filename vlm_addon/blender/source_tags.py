@@ -20,7 +20,8 @@ from .source_faces import SourceFaces, TagPlace
 
 def faces_to_tag(source: SourceFaces) -> SurfaceFaces:
     """What making lights needs to know to tag the faces that they stand for. Raises InvalidInput without unused ids."""
-    return SurfaceFaces(source.rows, living_tags(source.tags, tags_of_lights()), unused_automatic_tag())
+    tags = living_tags(source.tags, tags_of_lights())
+    return SurfaceFaces(source.rows, tags, source.groups, unused_automatic_tag())
 
 
 def require_unchanged(source: SourceFaces, tags: Int32) -> None:

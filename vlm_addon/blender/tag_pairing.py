@@ -158,7 +158,8 @@ def _paired(tagging: Tagging, pairs: RegionPairs, needed: Bool | None) -> Retagg
     face_tags = living_tags(tagging.source.tags, tagging.known)
     lit = unpaired(lights, faces, tagging.light_tags, face_tags, links)
     missing = len(np.unique(np.stack([lights[lit], faces[lit]], axis=1), axis=0))
-    found = add_tags(lights, faces, tagging.light_tags, face_tags, links, tagging.unused)
+    known = tagging.light_tags, face_tags, links
+    found = add_tags(lights, faces, *known, tagging.unused, tagging.source.groups)
     new_links = [
         make_links(np.concatenate([before, found.links[np.isin(found.links[:, 0], tags)]]))
         for before, tags in zip(tagging.links, _by_light_mesh(tagging, found.light_tags), strict=True)

@@ -7,13 +7,14 @@ section 3.4; tags.py). What carries a tag keeps it; what is missing is added wit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from .light_links import leaves_out, make_links
+from .errors import InvalidInput
+from .light_links import MOST_LINKS, leaves_out, make_links
 from .light_mesh import VirtualLightMesh
 from .mesh_topology import Bool, Int64
 from .scene import UNTAGGED, Int32, Mesh
@@ -46,6 +47,7 @@ def add_tags(
     face_tags: npt.ArrayLike,
     links: Int32,
     first_tag: int,
+    group_of_face: npt.ArrayLike | None = None,
 ) -> RegionTags:
     """Tags and links with which each face leaves out each light that it is paired with.
 
@@ -53,7 +55,9 @@ def add_tags(
     they are not UNTAGGED. links: (k, 2), kept. first_tag: from here on no id is used. A light without a tag takes that
     of its faces where they all carry the same, else one of its own; a face without a tag takes that of its lights
     where they all carry the same, else one of its own for this set of tags, to which each is linked. Where both carry
-    tags already, these are linked. Raises InvalidInput where there would be too many links.
+    tags already, these are linked. group_of_face: (f,) int, faces that may share a tag where one for each set of lights
+    would need more links than there can be; they then leave out more than their own. Raises InvalidInput where even
+    that needs too many.
     """
     lights, faces = np.asarray(lights, np.int64), np.asarray(faces, np.int64)
     light_tags, face_tags = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
@@ -64,9 +68,11 @@ def add_tags(
     light_tags[fresh] = first_tag + np.arange(len(fresh))
     bare = face_tags[faces] == UNTAGGED
     between = np.stack([light_tags[lights[~bare]], face_tags[faces[~bare]]], axis=1)
-    added = _tag_faces(light_tags[lights[bare]], faces[bare], face_tags, first_tag + len(fresh))
-    everything = np.concatenate([np.asarray(links, np.int64).reshape(-1, 2), between, added])
-    return RegionTags(light_tags, face_tags, make_links(everything))
+    known = np.concatenate([np.asarray(links, np.int64).reshape(-1, 2), between])
+    pairs = np.unique(np.stack([faces[bare], light_tags[lights[bare]]], axis=1), axis=0).astype(np.int64)
+    groups = None if group_of_face is None else np.asarray(group_of_face, np.int64)
+    added = _tag_faces(pairs, face_tags, groups, first_tag + len(fresh), MOST_LINKS - len(known))
+    return RegionTags(light_tags, face_tags, make_links(np.concatenate([known, added])))
 
 
 def _take_common_tag(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32) -> None:
@@ -79,18 +85,54 @@ def _take_common_tag(lights: Int64, faces: Int64, light_tags: Int32, face_tags: 
     light_tags[same] = high[same]
 
 
-def _tag_faces(tags: Int32, faces: Int64, face_tags: Int32, first_tag: int) -> Int64:
-    """Tag the faces of pairs (tag of a light, face without a tag); returns the links for it, (k, 2)."""
-    if not len(faces):
+def _tag_faces(pairs: Int64, face_tags: Int32, groups: Int64 | None, first_tag: int, most: int) -> Int64:
+    """Tag the faces of `pairs`, (p, 2) of a face without a tag and a tag of its lights, each once, in order of faces.
+
+    Returns the links for it, (k, 2). groups: (f,), see `add_tags`. Raises InvalidInput for more than `most` links.
+    """
+    rows, first, count = np.unique(pairs[:, 0], return_index=True, return_counts=True)
+    face_tags[rows[count == 1]] = pairs[first[count == 1], 1]
+    rows, first = rows[count > 1], first[count > 1]
+    pairs = pairs[np.isin(pairs[:, 0], rows)]
+    if not len(pairs):
         return np.zeros((0, 2), np.int64)
-    known, group = np.unique(tags, return_inverse=True)
-    rows, place = np.unique(faces, return_inverse=True)
-    # region_tags numbers groups from 1, and sets of them after that: the groups are the tags that there are.
-    found = region_tags(group, place, 1, len(known), len(rows), np.arange(len(known)))
+    known, tag = np.unique(pairs[:, 1], return_inverse=True)
+    least = np.minimum.reduceat(tag, np.searchsorted(pairs[:, 0], rows))
+    for shares in _ways_to_share(rows, least, groups):
+        number = shares[np.searchsorted(rows, pairs[:, 0])]
+        # region_tags numbers the tags that there are from 1, and sets of them after that.
+        found = _within(most, tag, number, len(known))
+        if found is not None:
+            break
+    else:
+        problem = f"{len(pairs):,} pairs of a light and a face of several lights need more than {most:,} links"
+        raise InvalidInput(
+            "tags", problem, "pair fewer objects at a time (select them, too), or Tag Thin Surfaces alone"
+        )
     sets = np.arange(max(int(found.face_tags.max()) - len(known), 0))
-    names = np.concatenate([[UNTAGGED], known.astype(np.int64), first_tag + sets])
-    face_tags[rows] = names[found.face_tags]
+    names = np.concatenate([[UNTAGGED], known, first_tag + sets])
+    face_tags[rows] = names[found.face_tags[shares]]
     return names[found.links].reshape(-1, 2)
+
+
+def _ways_to_share(rows: Int64, least: Int64, groups: Int64 | None) -> Iterator[Int64]:
+    """For each face a number, the same for those that are to share a tag: none, then more and more of a group."""
+    yield np.arange(len(rows))
+    if groups is not None:
+        span = int(least.max()) + 1
+        yield np.unique(groups[rows] * span + least, return_inverse=True)[1]
+        yield np.unique(groups[rows], return_inverse=True)[1]
+
+
+def _within(most: int, tag: Int64, number: Int64, tags: int) -> RegionTags | None:
+    """Tags of numbered faces, if they need no more than `most` links."""
+    pairs = np.unique(np.stack([number, tag], axis=1), axis=0)
+    try:
+        found = region_tags(pairs[:, 1], pairs[:, 0], 1, tags, int(number.max()) + 1, np.arange(tags))
+    except InvalidInput:
+        # It has counted its links itself.
+        return None
+    return found if len(found.links) <= most else None
 
 
 def unpaired(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32, links: Int32) -> Bool:
@@ -101,10 +143,12 @@ def unpaired(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32, l
 @dataclass(frozen=True)
 class SurfaceFaces:
     """Where the tags of visible triangles are kept. rows: for each mesh, (its triangles,) int32 row of `tags`, -1 for
-    none. tags: (f,) int32, the present ones. first_tag: from here on no id is used."""
+    none. tags: (f,) int32, the present ones. groups: (f,) int, which thing each row is of. first_tag: from here on no
+    id is used."""
 
     rows: tuple[Int32, ...]
     tags: Int32
+    groups: Int64
     first_tag: int
 
     def tagged(self, meshes: Sequence[Mesh], tags: Int32) -> tuple[Mesh, ...]:
@@ -124,7 +168,7 @@ def tagged_by_map(
     rows = np.concatenate([np.zeros(0, np.int64), *faces.rows])
     kept = (lights >= 0) & (rows >= 0)
     tags, links = light_mesh.tag_ids, light_mesh.links
-    found = add_tags(lights[kept], rows[kept], tags, faces.tags, links, faces.first_tag)
+    found = add_tags(lights[kept], rows[kept], tags, faces.tags, links, faces.first_tag, faces.groups)
     return replace(light_mesh, tag_ids=found.light_tags, links=found.links), found.face_tags
 
 
