@@ -95,6 +95,18 @@ def test_faces_of_a_receiver_that_have_ids_are_left_out_as_well(make_cube, make_
     assert left_out(lights, cube)
 
 
+def test_ids_of_links_whose_objects_are_gone_are_not_given_again(make_plane, make_lights):
+    floor, lights = make_plane("floor"), make_lights()
+    choose(lights, floor)
+    link()
+    bpy.data.objects.remove(floor)
+    wall = make_plane("wall")
+    choose(lights, wall)
+    link()
+    assert wall["vlm_tag"] == 3
+    assert list(lights["vlm_links"]) == [1, 2, 1, 3]
+
+
 def test_only_chosen_faces_are_linked_in_edit_mode(make_plane, make_lights):
     floor, lights = make_plane("floor"), make_lights(tags=(0, 0, 0))
     choose(lights, floor)

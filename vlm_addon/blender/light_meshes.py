@@ -31,6 +31,7 @@ from .names import (
     TAG_PROPERTY,
     is_light_mesh,
 )
+from .stored_links import read_links
 
 NO_ID = 0
 LARGEST_ID = 2**31 - 1
@@ -166,10 +167,13 @@ def tags_of(thing: Any) -> npt.NDArray[np.int32]:
 
 
 def new_tags(count: int, things: Iterable[Any] | None = None) -> npt.NDArray[np.int32]:
-    """(count,) int32: tag ids that none of `things` (all objects of the file by default) carries, ascending.
+    """(count,) int32: tag ids that none of `things` (all objects of the file by default) carries or has links of,
+    ascending: a link whose lights or surfaces are gone is not to hold for others.
 
     They are ids as artists give them, not those of pairing (core/tag_pairs.py).
     """
-    used = [tags_of(thing) for thing in (bpy.data.objects if things is None else things)]
+    looked_at = list(bpy.data.objects if things is None else things)
+    used = [tags_of(thing) for thing in looked_at]
+    used += [read_links(thing).ravel() for thing in looked_at if is_light_mesh(thing)]
     largest = max((int(tags.max()) for each in used if len(tags := each[~is_automatic(each)])), default=0)
     return np.arange(max(largest, 0) + 1, max(largest, 0) + 1 + count, dtype=np.int32)
