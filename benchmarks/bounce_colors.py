@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figure 5.5 of seed 002 again: the red wall of cornell_box bounces blue, or five times as strong, or both.
 
-`./dev bench bounce_colors` writes authoring_colors.png into docs/ and prints what changed: the mean indirect irradiance by
+`./dev bench bounce_colors` writes docs/authoring_colors.png and prints what changed: the mean indirect radiance by
 channel, and the largest change of the direct light, which must be none.
 """
 

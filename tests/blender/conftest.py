@@ -106,6 +106,24 @@ def make_material():
 
 
 @pytest.fixture
+def cube_lights(make_cube):
+    """The light mesh of a cube of edge 2, active: twelve lights just inside, each half of a side."""
+    # only tests that ask for it import the package: those of the installed extension must not
+    from vlm_addon.bake import BakeSettings
+    from vlm_addon.blender import authoring
+    from vlm_addon.blender.properties import ensure_scene_settings
+    from vlm_addon.core.progress import silent
+
+    ensure_scene_settings()
+    make_cube()
+    bpy.context.view_layer.update()
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
+    thing = bpy.data.objects["VLM"]
+    bpy.context.view_layer.objects.active = thing
+    return thing
+
+
+@pytest.fixture
 def scene():
     """The scene of the file."""
     return bpy.context.scene

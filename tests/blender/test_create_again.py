@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light meshes made anew around locked lights."""
+"""Light meshes made anew around locked cube_lights."""
 
 import bpy
 import numpy as np
@@ -16,17 +16,6 @@ from vlm_addon.core.progress import silent
 ensure_scene_settings()
 
 
-@pytest.fixture
-def lights(make_cube):
-    """The light mesh of a cube of edge 2, active."""
-    make_cube()
-    bpy.context.view_layer.update()
-    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
-    thing = bpy.data.objects["VLM"]
-    bpy.context.view_layer.objects.active = thing
-    return thing
-
-
 def again(settings=None):
     return authoring.write(create_again.again(bpy.context, settings or BakeSettings(), False)(silent))
 
@@ -36,33 +25,33 @@ def faces_at(thing, axis, side):
     return np.array([polygon.normal[axis] * side > 0.9 for polygon in thing.data.polygons])
 
 
-def test_locked_lights_stay_and_the_rest_is_made_anew(lights):
-    top = faces_at(lights, 2, 1.0)
-    colors = read_faces(lights, "vlm_color")
+def test_locked_lights_stay_and_the_rest_is_made_anew(cube_lights):
+    top = faces_at(cube_lights, 2, 1.0)
+    colors = read_faces(cube_lights, "vlm_color")
     colors[:, :3] = (0.1, 0.2, 7.5)
-    write_faces(lights, "vlm_color", colors)
-    write_faces(lights, "vlm_lock", top)
+    write_faces(cube_lights, "vlm_color", colors)
+    write_faces(cube_lights, "vlm_lock", top)
     corners = extract().light_mesh.corners[top]
-    lights["vlm_strength"], lights["vlm_hue"] = 3.0, (1.0, 0.5, 1.0)
+    cube_lights["vlm_strength"], cube_lights["vlm_hue"] = 3.0, (1.0, 0.5, 1.0)
     again()
-    locked = read_faces(lights, "vlm_lock") != 0
+    locked = read_faces(cube_lights, "vlm_lock") != 0
     assert locked.sum() == 2
-    assert np.array_equal(locked, faces_at(lights, 2, 1.0))
-    kept = read_faces(lights, "vlm_color")[:, :3]
+    assert np.array_equal(locked, faces_at(cube_lights, 2, 1.0))
+    kept = read_faces(cube_lights, "vlm_color")[:, :3]
     assert kept[locked] == pytest.approx(np.tile(np.float32((0.1, 0.2, 7.5)), (2, 1)))
     assert (kept[~locked, 2] < 1.0).all()
-    assert (lights["vlm_strength"], *lights["vlm_hue"]) == (3.0, 1.0, 0.5, 1.0)
+    assert (cube_lights["vlm_strength"], *cube_lights["vlm_hue"]) == (3.0, 1.0, 0.5, 1.0)
     assert extract().light_mesh.corners[locked] == pytest.approx(corners, abs=1e-6)
 
 
-def test_no_light_stands_twice_for_the_surface_of_a_locked_one(lights):
+def test_no_light_stands_twice_for_the_surface_of_a_locked_one(cube_lights):
     area = extract().light_mesh.areas.sum()
-    write_faces(lights, "vlm_lock", faces_at(lights, 0, -1.0))
+    write_faces(cube_lights, "vlm_lock", faces_at(cube_lights, 0, -1.0))
     again()
     assert extract().light_mesh.areas.sum() == pytest.approx(area, rel=1e-3)
 
 
-def test_without_locks_it_is_the_same_again(lights):
+def test_without_locks_it_is_the_same_again(cube_lights):
     before = extract().light_mesh
     again()
     after = extract().light_mesh
@@ -70,20 +59,20 @@ def test_without_locks_it_is_the_same_again(lights):
     assert np.array_equal(after.colour, before.colour)
 
 
-def test_more_locked_lights_than_are_asked_for_is_refused_and_changes_nothing(lights):
-    write_faces(lights, "vlm_lock", np.ones(12))
+def test_more_locked_lights_than_are_asked_for_is_refused_and_changes_nothing(cube_lights):
+    write_faces(cube_lights, "vlm_lock", np.ones(12))
     with pytest.raises(InvalidInput, match="12 of its lights are locked, 8 are asked for"):
         again(BakeSettings(target_triangles=8))
-    assert len(lights.data.polygons) == 12
+    assert len(cube_lights.data.polygons) == 12
 
 
-def test_a_renamed_source_is_found(lights):
+def test_a_renamed_source_is_found(cube_lights):
     bpy.data.objects["Cube"].name = "Crate"
     assert create_again.again_problem(bpy.context) is None
     assert again().startswith("Made 12 virtual lights")
 
 
-def test_what_cannot_be_made_again_says_why(lights, make_plane):
+def test_what_cannot_be_made_again_says_why(cube_lights, make_plane):
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     assert create_again.again_problem(bpy.context) == "All that VLM was made from is gone"
     bpy.context.view_layer.objects.active = make_plane()

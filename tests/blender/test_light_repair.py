@@ -20,15 +20,6 @@ from vlm_addon.core.progress import silent
 ensure_scene_settings()
 
 
-@pytest.fixture
-def lights(make_cube):
-    """The light mesh of a cube of edge 2: twelve lights, each just inside."""
-    make_cube()
-    bpy.context.view_layer.update()
-    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
-    return bpy.data.objects["VLM"]
-
-
 def check():
     """Kinds of what the check finds, as the scene keeps them."""
     checking.list_checked(checking.check(bpy.context)(silent))
@@ -56,56 +47,56 @@ def middle(thing, face):
     return np.array(thing.matrix_world @ thing.data.polygons[face].center)
 
 
-def test_a_sound_light_mesh_has_nothing_to_fix(lights):
+def test_a_sound_light_mesh_has_nothing_to_fix(cube_lights):
     assert check() == []
     with pytest.raises(InvalidInput, match="none of them can be fixed"):
         fix()
 
 
 @pytest.mark.parametrize(("value", "kind"), [(np.nan, kinds.NOT_FINITE), (np.inf, kinds.NOT_FINITE)])
-def test_values_that_are_no_numbers_become_black(lights, value, kind):
-    before = read_faces(lights, "vlm_color")
-    spoil(lights, "vlm_color", 4, value)
+def test_values_that_are_no_numbers_become_black(cube_lights, value, kind):
+    before = read_faces(cube_lights, "vlm_color")
+    spoil(cube_lights, "vlm_color", 4, value)
     assert kind in check()
     assert marked_faces(bpy.context.scene, bpy.context.scene.vlm.findings[0])["VLM"].tolist() == [4]
     fix()
-    after = read_faces(lights, "vlm_color")
+    after = read_faces(cube_lights, "vlm_color")
     assert after[4, :3].tolist() == [0.0, 0.0, 0.0]
     assert np.array_equal(np.delete(after, 4, axis=0), np.delete(before, 4, axis=0))
     assert check() == []
 
 
-def test_negative_colours_and_factors_become_zero(lights):
-    spoil(lights, "vlm_color", 2, -1.0)
-    lights["vlm_hue"] = (1.0, -2.0, 1.0)
+def test_negative_colours_and_factors_become_zero(cube_lights):
+    spoil(cube_lights, "vlm_color", 2, -1.0)
+    cube_lights["vlm_hue"] = (1.0, -2.0, 1.0)
     assert kinds.NEGATIVE in check()
     fix(kinds.NEGATIVE)
-    assert read_faces(lights, "vlm_color")[2, :3].tolist() == [0.0, 0.0, 0.0]
-    assert list(lights["vlm_hue"]) == [1.0, 0.0, 1.0]
+    assert read_faces(cube_lights, "vlm_color")[2, :3].tolist() == [0.0, 0.0, 0.0]
+    assert list(cube_lights["vlm_hue"]) == [1.0, 0.0, 1.0]
 
 
-def test_a_light_that_was_turned_over_is_turned_back(lights):
-    normal = np.array(lights.data.polygons[7].normal)
-    lights.data.polygons[7].flip()
-    lights.data.update()
+def test_a_light_that_was_turned_over_is_turned_back(cube_lights):
+    normal = np.array(cube_lights.data.polygons[7].normal)
+    cube_lights.data.polygons[7].flip()
+    cube_lights.data.update()
     found = check()
     assert {kinds.NON_MANIFOLD, kinds.INSIDE_OUT} & set(found)
     fix()
-    assert np.array(lights.data.polygons[7].normal) == pytest.approx(normal)
+    assert np.array(cube_lights.data.polygons[7].normal) == pytest.approx(normal)
     assert check() == []
 
 
-def test_a_light_in_front_is_pushed_behind_with_its_power(lights):
-    power = area_times_scale(lights)
-    for vertex in lights.data.vertices:
+def test_a_light_in_front_is_pushed_behind_with_its_power(cube_lights):
+    power = area_times_scale(cube_lights)
+    for vertex in cube_lights.data.vertices:
         vertex.co *= 1.05
-    lights.data.update()
+    cube_lights.data.update()
     assert kinds.IN_FRONT in check()
     fix(kinds.IN_FRONT)
     assert check() == []
-    places = np.array([lights.matrix_world @ vertex.co for vertex in lights.data.vertices])
+    places = np.array([cube_lights.matrix_world @ vertex.co for vertex in cube_lights.data.vertices])
     assert np.abs(places).max() < 1.0
-    assert area_times_scale(lights) == pytest.approx(1.05**2 * power, rel=1e-5)
+    assert area_times_scale(cube_lights) == pytest.approx(1.05**2 * power, rel=1e-5)
 
 
 def area_times_scale(thing):
@@ -113,40 +104,39 @@ def area_times_scale(thing):
     return float(areas @ read_faces(thing, "vlm_area_scale"))
 
 
-def test_fixing_in_edit_mode_ends_there(lights):
-    spoil(lights, "vlm_color", 0, -1.0)
-    bpy.context.view_layer.objects.active = lights
+def test_fixing_in_edit_mode_ends_there(cube_lights):
+    spoil(cube_lights, "vlm_color", 0, -1.0)
     bpy.ops.object.mode_set(mode="EDIT")
     assert kinds.NEGATIVE in check()
     fix()
     assert bpy.context.mode == "EDIT_MESH"
-    assert read_faces(lights, "vlm_color")[0, :3].tolist() == [0.0, 0.0, 0.0]
+    assert read_faces(cube_lights, "vlm_color")[0, :3].tolist() == [0.0, 0.0, 0.0]
 
 
-def test_what_an_artist_may_have_meant_has_its_own_button_alone(lights):
-    spoil(lights, "vlm_color", 3, (4.0, 2.0, 1.0, 1.0))
+def test_what_an_artist_may_have_meant_has_its_own_button_alone(cube_lights):
+    spoil(cube_lights, "vlm_color", 3, (4.0, 2.0, 1.0, 1.0))
     assert check() == [kinds.BRIGHT]
     assert fixable_kinds(bpy.context.scene) == []
     fix(kinds.BRIGHT)
-    assert read_faces(lights, "vlm_color")[3, :3] == pytest.approx([1.0, 0.5, 0.25], rel=1e-6)
+    assert read_faces(cube_lights, "vlm_color")[3, :3] == pytest.approx([1.0, 0.5, 0.25], rel=1e-6)
 
 
-def test_a_tag_without_a_surface_is_cleared(lights):
-    spoil(lights, "vlm_tag", 5, 77)
+def test_a_tag_without_a_surface_is_cleared(cube_lights):
+    spoil(cube_lights, "vlm_tag", 5, 77)
     assert check() == [kinds.LOST_TAG]
     fix()
-    assert not read_faces(lights, "vlm_tag").any()
+    assert not read_faces(cube_lights, "vlm_tag").any()
 
 
-def test_lights_without_area_are_deleted(lights):
-    first = lights.data.polygons[0].vertices
-    moved = lights.data.vertices[first[0]].co.copy()
-    lights.data.vertices[first[1]].co = moved
-    lights.data.update()
+def test_lights_without_area_are_deleted(cube_lights):
+    first = cube_lights.data.polygons[0].vertices
+    moved = cube_lights.data.vertices[first[0]].co.copy()
+    cube_lights.data.vertices[first[1]].co = moved
+    cube_lights.data.update()
     assert kinds.DEGENERATE in check()
-    count = sum(polygon.area < 1e-12 for polygon in lights.data.polygons)
+    count = sum(polygon.area < 1e-12 for polygon in cube_lights.data.polygons)
     fix(kinds.DEGENERATE)
-    assert len(lights.data.polygons) == 12 - count
+    assert len(cube_lights.data.polygons) == 12 - count
     assert kinds.DEGENERATE not in check()
 
 
@@ -169,31 +159,30 @@ def test_a_sheet_seen_from_both_sides_gets_tags_by_which_it_leaves_its_lights_ou
     assert check() == []
 
 
-def test_a_deformed_light_mesh_is_not_moved_and_said_to_be(lights):
-    for vertex in lights.data.vertices:
+def test_a_deformed_light_mesh_is_not_moved_and_said_to_be(cube_lights):
+    for vertex in cube_lights.data.vertices:
         vertex.co *= 1.05
-    lights.modifiers.new("Cast", "CAST").factor = 0.0
-    before = [vertex.co.copy() for vertex in lights.data.vertices]
+    cube_lights.modifiers.new("Cast", "CAST").factor = 0.0
+    before = [vertex.co.copy() for vertex in cube_lights.data.vertices]
     assert kinds.IN_FRONT in check()
     (told,) = fix(kinds.IN_FRONT)
     assert "left out 'VLM', which modifiers or shape keys deform" in told
-    assert [vertex.co for vertex in lights.data.vertices] == before
+    assert [vertex.co for vertex in cube_lights.data.vertices] == before
 
 
-def test_offenders_are_selected_in_edit_mode(lights):
-    spoil(lights, "vlm_color", 3, 4.0)
-    spoil(lights, "vlm_color", 8, 4.0)
+def test_offenders_are_selected_in_edit_mode(cube_lights):
+    spoil(cube_lights, "vlm_color", 3, 4.0)
+    spoil(cube_lights, "vlm_color", 8, 4.0)
     check()
     assert select_offenders(bpy.context, 0) == 2
     assert bpy.context.mode == "EDIT_MESH"
     bpy.ops.object.mode_set(mode="OBJECT")
-    assert [polygon.index for polygon in lights.data.polygons if polygon.select] == [3, 8]
+    assert [polygon.index for polygon in cube_lights.data.polygons if polygon.select] == [3, 8]
 
 
-def test_a_light_mesh_that_has_changed_since_is_to_be_checked_again(lights):
-    spoil(lights, "vlm_color", 3, 4.0)
+def test_a_light_mesh_that_has_changed_since_is_to_be_checked_again(cube_lights):
+    spoil(cube_lights, "vlm_color", 3, 4.0)
     check()
-    bpy.context.view_layer.objects.active = lights
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.subdivide()
