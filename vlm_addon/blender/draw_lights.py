@@ -272,5 +272,7 @@ def _sentence(made: NewLights, thing: Any, count: int) -> str:
     if made.from_behind:
         parts.append("on the back of the surface, which sends out no light: turn its normals (Mesh > Normals > Flip)")
     if made.in_front:
-        parts.append(f"{made.in_front} still in front of their surface, which is too thin there: give both a tag")
+        parts.append(
+            f"{made.in_front} still in front of their surface (thin, or a step in it): draw smaller, or tag both"
+        )
     return "; ".join(parts)
