@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from mathutils import Matrix
 
+from ..core.errors import VlmError
 from ..core.grid_samples import Cells, GridView, cells_around, look, slice_cells
 from ..core.light_grid import RANGE
 from ..core.scene import Float64
@@ -207,9 +208,14 @@ class OverlayDrawing:
         return self._part(GRID, key, lambda: cell_shapes(cells, tolerance, place in AXES, axis, 0.6 * settings.opacity))
 
     def _part(self, name: str, key: Any, shapes: Callable[[], Iterable[Shape]]) -> _Part:
+        """The kept part of that name and key, or one made of `shapes`: empty where these cannot be had."""
         kept = self._parts.get(name)
         if kept is None or kept.key != key:
-            self._parts[name] = _Part(key, [self._batch(shape) for shape in shapes() if len(shape.positions)])
+            try:
+                found = list(shapes())
+            except VlmError:
+                found = []  # Check says what is wrong; a message with every redraw would help nobody
+            self._parts[name] = _Part(key, [self._batch(shape) for shape in found if len(shape.positions)])
         return self._parts[name]
 
     def _batch(self, shape: Shape) -> tuple[bool, Any]:
@@ -325,7 +331,10 @@ def _is_chosen(thing: Any) -> bool:
 
 def _reach(scene: Any) -> float | None:
     """Radii that lights reach, None where they reach everywhere."""
-    settings = scene_grid_settings(scene)
+    try:
+        settings = scene_grid_settings(scene)
+    except VlmError:
+        return None  # the renderer names the setting that is out of range
     return settings.range if settings is not None and settings.mode == RANGE else None
 
 
