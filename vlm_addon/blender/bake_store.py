@@ -75,7 +75,7 @@ def store(scene: Any, grid: LightGrid, key: BakeKey, visibility: BakedVisibility
 
 
 def stored_key(scene: Any) -> BakeKey | None:
-    """What the light grid of `scene` was baked from; None where there is none. Raises InvalidInput where it is broken."""
+    """What the light grid of `scene` was baked from, None where there is none. Raises InvalidInput for a broken one."""
     path = grid_path(scene)
     told = path.with_suffix(KEY_SUFFIX)
     if not path.is_file() or not told.is_file():
