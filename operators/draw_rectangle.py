@@ -20,8 +20,12 @@ class VLM_OT_draw_rectangle(draw_gestures.RectangleGesture, draw_operators.NewLi
         subtype="DIRECTION",
         options={"SKIP_SAVE"},
     )
-    columns: bpy.props.IntProperty(name="Columns", description="Lights side by side", default=1, min=1, max=100)
-    rows: bpy.props.IntProperty(name="Rows", description="Lights one over the other", default=1, min=1, max=100)
+    columns: bpy.props.IntProperty(
+        name="Columns", description="Lights side by side", default=1, min=1, max=draw_shapes.MOST_ROWS
+    )
+    rows: bpy.props.IntProperty(
+        name="Rows", description="Lights one over the other", default=1, min=1, max=draw_shapes.MOST_ROWS
+    )
 
     @classmethod
     def poll(cls, context):

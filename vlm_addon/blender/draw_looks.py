@@ -214,13 +214,12 @@ def _tag(under: _Under) -> int:
 def _under(surface: _Surface, tag: int, hit: SurfaceHit, piece: Float64) -> _Under | None:
     """The triangle of face `hit.face` that holds the hit, or None where the face is elsewhere."""
     best, least = None, ON_TRIANGLE
+    points = np.concatenate([hit.location[None], piece])
     for vertices, loops, local in surface.triangles(hit.face):
-        corners = local @ hit.matrix[:3, :3].T + hit.matrix[:3, 3]
-        weights, off = _weights(corners, hit.location[None])
-        outside = max(-float(weights.min()), off)
+        weights, off = _weights(local @ hit.matrix[:3, :3].T + hit.matrix[:3, 3], points)
+        outside = max(-float(weights[0].min()), off)
         if outside < least:
-            best = _Under(surface, hit.face, vertices, loops, _weights(corners, piece)[0], tag)
-            least = outside
+            best, least = _Under(surface, hit.face, vertices, loops, weights[1:], tag), outside
     return best
 
 

@@ -19,6 +19,9 @@ BEND_COSINE = 0.85
 ACROSS_COSINE = 0.5
 """Cosine between an edge and a corner from which the strip goes across it."""
 
+MOST_ROWS = 16
+"""Rows or columns of a grid: more take seconds to be laid on the surface."""
+
 UPRIGHT = 0.9
 """Cosine with the world's z from which a surface counts as lying, so that its rectangles are aligned with x."""
 
