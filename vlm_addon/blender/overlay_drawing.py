@@ -172,7 +172,7 @@ class OverlayDrawing:
         gpu.state.blend_set("NONE")
 
     def _light_mesh_part(self, thing: Any, depsgraph: Any, settings: Any, scene: Any) -> _Part:
-        reach = _reach(scene) if settings.half_balls and _is_chosen(thing) else None
+        reach = reach_of(scene) if settings.half_balls and _is_chosen(thing) else None
         marks = _marks(scene) if settings.findings else ()
         changes = [self._changes.get(("Object", thing.name), 0), self._changes.get(("Mesh", thing.data.name), 0)]
         looks = (settings.fill, settings.sides, settings.opacity, reach, marks)
@@ -329,7 +329,7 @@ def _is_chosen(thing: Any) -> bool:
     return bool(thing.mode == "EDIT" or thing.select_get())
 
 
-def _reach(scene: Any) -> float | None:
+def reach_of(scene: Any) -> float | None:
     """Radii that lights reach, None where they reach everywhere."""
     try:
         settings = scene_grid_settings(scene)

@@ -13,10 +13,9 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.grid_samples import GridView
-from ..core.light_grid import RANGE
-from .light_grid_options import scene_grid_settings
+from ..core.light_grid import FEW_LIGHTS, TOLERANCE
 from .light_meshes import light_meshes
-from .overlay_drawing import OverlayDrawing
+from .overlay_drawing import OverlayDrawing, reach_of
 from .overlay_shapes import COLOR, EMISSION, MOST_HALF_BALLS, NONE, TAGS
 
 WINDOW_PROPERTY = "vlm_overlay"
@@ -107,11 +106,15 @@ def overlay_hint(context: Any) -> str | None:
         return None
     if not light_meshes(context.scene):
         return "There is no light mesh to show: create one first"
-    asked = scene_grid_settings(context.scene)
-    if settings.half_balls and (asked is None or asked.mode != RANGE):
+    if settings.half_balls and reach_of(context.scene) is None:
         return "Lights reach everywhere: Reach shows something with Lights set to Range (Render)"
-    if settings.grid and _DRAWING.grid_of(context.scene) is None:
+    if not settings.grid:
+        return None
+    shown = _DRAWING.grid_of(context.scene)
+    if shown is None:
         return "No light grid is shown yet: press Show Light Grid"
+    if shown.grid.settings.mode == TOLERANCE and shown.grid.light_count <= FEW_LIGHTS:
+        return f"Up to {FEW_LIGHTS} lights are summed one by one: pictures have no such error"
     return None
 
 
