@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import VlmError
+from .draw_fill import fill_sources
 from .light_meshes import is_local
 from .names import is_light_mesh
 
@@ -88,8 +89,6 @@ def draw_problem(context: Any) -> str | None:
 
 def fill_problem(context: Any) -> str | None:
     """Why there are no faces to fill, or None."""
-    from .draw_fill import fill_sources
-
     if context.mode not in ("OBJECT", "EDIT_MESH"):
         return "Leave this mode first: faces are filled in Object Mode or Edit Mode"
     if not fill_sources(context):
