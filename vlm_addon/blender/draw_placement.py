@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.errors import InvalidInput
 from ..core.mesh_topology import Rows
 from ..core.placement import LARGEST_INSET, THICKNESS_SHARE, intrusions
 from ..core.scene import Float64
@@ -61,8 +62,13 @@ class Placed:
 
 
 def pieces_of(faces: Faces, scene: Any, depsgraph: Any, sign: float = 1.0) -> Pieces:
-    """The pieces of faces with the surface under them; sign: -1 for surfaces that face the other way."""
+    """The pieces of faces with the surface under them; sign: -1 for surfaces that face the other way.
+
+    Raises InvalidInput where no face has a triangle with an area.
+    """
     triangles, owners = triangles_of(faces)
+    if not len(triangles):
+        raise InvalidInput("polygon", "no part of it has an area", "draw it larger")
     side = next((side for most, side in SIDES if len(triangles) <= most), COARSE_SIDE)
     nodes, cells = _grid(side)
     corners, ground, hits, areas = [], [], [], []
