@@ -13,9 +13,6 @@ from .names import is_light_mesh
 
 PICK = {"LEFTMOUSE"}
 STOP = {"ESC", "RIGHTMOUSE"}
-PAST_LIGHTS = 1e-5
-"""How far past a light mesh that was hit the ray goes on, as a share of the way so far, and at least in metres."""
-MOST_LIGHTS_PASSED = 64
 
 
 def surface_at(context: Any, region: Any, x: float, y: float) -> tuple[Vector, Any] | None:
@@ -23,15 +20,34 @@ def surface_at(context: Any, region: Any, x: float, y: float) -> tuple[Vector, A
     view = region.data
     origin = region_2d_to_origin_3d(region, view, (x, y))
     direction = region_2d_to_vector_3d(region, view, (x, y))
-    depsgraph = context.evaluated_depsgraph_get()
-    for _ in range(MOST_LIGHTS_PASSED):
-        hit, point, _, _, thing, _ = context.scene.ray_cast(depsgraph, origin, direction)
-        if not hit:
-            return None
-        if not is_light_mesh(thing):
-            return point, thing
-        origin = point + direction * max(PAST_LIGHTS, PAST_LIGHTS * (point - origin).length)
-    return None
+    return surface_along(context.scene, context.evaluated_depsgraph_get(), origin, direction)
+
+
+def surface_along(scene: Any, depsgraph: Any, origin: Vector, direction: Vector) -> tuple[Vector, Any] | None:
+    """World-space point and object of the first surface that a ray meets, or None.
+
+    `Scene.ray_cast` stops at light meshes, which may lie in the very plane of what they stand for, so each object is
+    asked by itself, too; an object that is being edited answers to the scene alone. What is disabled in renders
+    bounces no light and is passed.
+    """
+    met = []
+    hit, point, _, _, thing, _ = scene.ray_cast(depsgraph, origin, direction)
+    if hit and _is_surface(thing):
+        met.append((point, thing.original))
+    for instance in depsgraph.object_instances:
+        thing, matrix = instance.object, instance.matrix_world
+        asked = instance.show_self and thing.type == "MESH" and _is_surface(thing)
+        if not asked or not matrix.determinant():
+            continue
+        inverse = matrix.inverted()
+        hit, point, _, _ = thing.ray_cast(inverse @ origin, (inverse.to_3x3() @ direction).normalized())
+        if hit:
+            met.append((matrix @ point, thing.original))
+    return min(met, key=lambda each: (each[0] - origin).length, default=None)
+
+
+def _is_surface(thing: Any) -> bool:
+    return not is_light_mesh(thing) and not thing.hide_render
 
 
 def region_under_mouse(context: Any, event: Any) -> Any | None:
