@@ -71,7 +71,7 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 def nearest_by_brute_force(lights: np.ndarray, source: np.ndarray) -> np.ndarray:
     """Scores by distances to a dense set of points of each light, to within their spacing."""
-    steps = np.linspace(0, 1, 60)
+    steps = np.linspace(0, 1, 30)
     u, v = (each.ravel() for each in np.meshgrid(steps, steps))
     inside = u + v <= 1
     weights = np.stack([u, v, 1 - u - v], axis=1)[inside]
@@ -91,7 +91,7 @@ def test_nearest_light_is_that_of_brute_force() -> None:
     source = rng.uniform(-1, 1, (300, 1, 3)) + rng.uniform(-0.05, 0.05, (300, 3, 3))
     found = light_of_triangles(lights, source)
     score = nearest_by_brute_force(lights, source)
-    assert (score[np.arange(300), found] <= score.min(axis=1) + 0.01).all()
+    assert (score[np.arange(300), found] <= score.min(axis=1) + 0.02).all()
     assert (found == score.argmin(axis=1)).mean() > 0.97
 
 
