@@ -23,11 +23,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.scene_bounce import Bounce, spread_points, triangle_lights
+from benchmarks.simplify_plot import draw
 from benchmarks.simplify_rivals import RIVALS, Soup, joined, nearest_lights
 from benchmarks.support import MODELS, SAMPLE_BLENDS, open_sample, quiet
 from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
-from vlm_addon.core.light_mesh import VirtualLightMesh
+from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
 from vlm_addon.core.mesh_topology import Int64, rows_by_key, sum_by
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.placement import place_behind
@@ -93,6 +94,9 @@ def main() -> None:
                 rows.append(row)
                 print(" ".join(_cells(row)), flush=True)
     print(table(HEADER, [_cells(row) for row in rows]))
+    if options.out:
+        what = "reflectance alone" if options.lighting == "unit" else "the scene's lamps"
+        draw(options.out, rows, f"Bounce from few lights against every triangle as a light ({what})")
 
 
 def snapshot_of(name: str) -> SceneSnapshot:
@@ -134,7 +138,6 @@ def compared(case: Case, budgets: Sequence[int], ways: Sequence[str]) -> Iterato
                 points, triangles = RIVALS[way](soup, budget)
                 seconds = time.process_time() - start
                 region = nearest_lights(case.surface, (points, triangles))
-                placed = replace(_as_lights(points, triangles))
                 rows = rows_by_key(region, len(triangles))
                 moved = place_behind(points, triangles, rows, case.surface.corners).positions
                 placed = _as_lights(moved, triangles)
@@ -176,8 +179,6 @@ def region_means(case: Case, region: Int64, count: int) -> tuple[Float64, Float6
 
 def _as_lights(points: Float64, triangles: Int64) -> VirtualLightMesh:
     count = len(triangles)
-    from vlm_addon.core.light_mesh import empty_light_mesh
-
     return replace(
         empty_light_mesh(),
         vertices=points,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other ways to make few triangles of a scene: of all its meshes joined to one, with borders and materials forgotten."""
+"""Other ways to make few triangles of a scene: its meshes joined to one, borders and materials forgotten."""
 
 from __future__ import annotations
 
