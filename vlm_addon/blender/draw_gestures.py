@@ -128,16 +128,22 @@ class ExtrudeGesture(ModalStroke):
 
     def shape(self, places: list[Place]) -> list[Float64]:
         """The strip."""
-        if len(places) < 2:
-            return []
-        path, normals = self._way(places)
-        points, rings, _ = strip(self._edge, path, normals)
+        points, rings = self._strip(places)
         return [points[[*ring, ring[0]]] for ring in rings]
 
     def status(self, places: list[Place]) -> str:
         """What is to be done, and how many lights there will be."""
-        count = len(strip(self._edge, *self._way(places))[1]) if len(places) > 1 else 0
+        count = len(self._strip(places)[1])
         return light_count(count) if count else "drag an edge of a light"
+
+    def _strip(self, places: list[Place]) -> tuple[Float64, list[list[int]]]:
+        """Points and corners; none before the mouse has left the edge, or found one."""
+        if len(places) < self.least_points:
+            return np.zeros((0, 3)), []
+        try:
+            return strip(self._edge, *self._way(places))[:2]
+        except InvalidInput:
+            return np.zeros((0, 3)), []
 
     def _way(self, places: list[Place]) -> tuple[Float64, Float64]:
         # The grabbed point of the edge shows at the first place, and goes the way that the mouse goes.
