@@ -306,16 +306,14 @@ class OverlayDrawing:
 def _layer_towards(region_data: Any, cells: Cells, cursor: Float64) -> Bools:
     """(c,) cells of the layer of the 3D cursor that one looks at most directly: numbers behind others are no use."""
     axis = int(np.abs(np.array(region_data.view_matrix)[2, :3]).argmax())
-    middles = cells.corners.mean(axis=1)[:, axis]
-    nearest = np.abs(middles - cursor[axis]).min(initial=np.inf)
-    half = 0.5 * np.ptp(cells.corners[:, :, axis], axis=1).max(initial=0.0)
-    return np.asarray(np.abs(middles - cursor[axis]) < nearest + half)
+    low = cells.corners[:, 0, axis]
+    middle = cells.corners[np.abs(cells.corners[:, :, axis].mean(axis=1) - cursor[axis]).argmin(), 0, axis]
+    return np.asarray(low == middle)
 
 
 def cell_text(cells: Cells, row: int) -> str:
-    """How many lights and clusters count in a cell, and how far irradiance there may be off."""
-    count = f"{int(cells.counts[row]):,}"
-    return count if cells.errors is None else f"{count}: {cells.errors[row]:.1%}"
+    """How many lights a cell lists, or with a tolerance how far irradiance there may be off."""
+    return f"{int(cells.counts[row]):,}" if cells.errors is None else f"{cells.errors[row]:.1%}"
 
 
 def _nearer(region_data: Any, share: float) -> Matrix:

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from .scene import Float64, Int32
+
+Int64 = npt.NDArray[np.int64]
 
 NORMAL_LENGTH = 0.35
 """Of the line that shows which side shines, in square roots of its face's area."""
@@ -19,16 +22,25 @@ def outlines(corners: Float64, faces: Int32) -> Float64:
     """
     if not len(corners):
         return np.zeros((0, 2, 3))
-    _, point = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    triangles = point.reshape(-1, 3)
+    triangles = _same_places(corners.reshape(-1, 3)).reshape(-1, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     places = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    ordered = np.sort(edges, axis=1)
-    owned = np.column_stack([np.repeat(faces, 3), ordered])
-    _, within, counts = np.unique(owned, axis=0, return_inverse=True, return_counts=True)
-    rim = counts[within.reshape(-1)] == 1
-    _, first = np.unique(ordered[rim], axis=0, return_index=True)
-    return np.asarray(places[rim][np.sort(first)])
+    count = int(triangles.max()) + 1
+    _, edge = np.unique(edges.min(axis=1) * count + edges.max(axis=1), return_inverse=True)
+    owned = np.repeat(faces.astype(np.int64), 3) * (int(edge.max()) + 1) + edge
+    _, within, uses = np.unique(owned, return_inverse=True, return_counts=True)
+    rim = uses[within] == 1
+    _, first = np.unique(edge[rim], return_index=True)
+    return np.asarray(places[rim][first])
+
+
+def _same_places(points: Float64) -> Int64:
+    """(n,) a number for each of (n, 3) points, the same for points that are the same."""
+    order = np.lexsort(points.T)
+    is_new = np.append(True, (np.diff(points[order], axis=0) != 0.0).any(axis=1))
+    numbers = np.empty(len(points), np.int64)
+    numbers[order] = np.cumsum(is_new) - 1
+    return numbers
 
 
 def normal_lines(middles: Float64, normals: Float64, areas: Float64) -> Float64:
