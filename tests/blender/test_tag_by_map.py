@@ -69,6 +69,7 @@ def test_creating_again_replaces_the_tags_and_needs_no_more_lights(things):
     assert len(again.bake.light_mesh) == len(first.bake.light_mesh)
     assert np.array_equal(again.bake.light_mesh.vertices, first.bake.light_mesh.vertices)
     assert [len(set(read_faces(thing, "vlm_tag").tolist())) for thing in things] == [len(set(each)) for each in tags]
+    assert len(again.bake.light_mesh.links) == len(first.bake.light_mesh.links)
 
 
 def test_tags_that_artists_gave_stay(things):

@@ -132,7 +132,9 @@ def _work(
     keep: VirtualLightMesh | None = None,
 ) -> Callable[[Progress], Made]:
     locked = len(keep) if keep is not None else 0
-    faces = faces_to_tag(tagged) if tagged is not None else None
+    kept = () if keep is None else (keep.tag_ids, keep.links[np.isin(keep.links[:, 0], keep.tag_ids)])
+    replaced = bpy.data.scenes[snapshot.name].objects.get(name)
+    faces = faces_to_tag(tagged, replaced, kept) if tagged is not None else None
     plain = replace(snapshot, meshes=tuple(map(without_automatic, snapshot.meshes)))
 
     def work(progress: Progress) -> Made:

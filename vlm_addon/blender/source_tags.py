@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import bpy
 import numpy as np
@@ -18,10 +19,14 @@ from .names import TAG_PROPERTY
 from .source_faces import SourceFaces, TagPlace
 
 
-def faces_to_tag(source: SourceFaces) -> SurfaceFaces:
-    """What making lights needs to know to tag the faces that they stand for. Raises InvalidInput without unused ids."""
-    tags = living_tags(source.tags, tags_of_lights())
-    return SurfaceFaces(source.rows, tags, source.groups, unused_automatic_tag())
+def faces_to_tag(source: SourceFaces, replaced: Any, kept: Sequence[Int32]) -> SurfaceFaces:
+    """What making lights needs to know to tag the faces that they stand for.
+
+    replaced: the light mesh object that they will take the place of, or None; faces forget what was paired with it.
+    kept: arrays of ids that it keeps. Raises InvalidInput without unused ids.
+    """
+    known = np.concatenate([tags_of_lights(replaced), *(np.ravel(tags) for tags in kept)])
+    return SurfaceFaces(source.rows, living_tags(source.tags, known), source.groups, unused_automatic_tag())
 
 
 def require_unchanged(source: SourceFaces, tags: Int32) -> None:
