@@ -99,7 +99,8 @@ class Sequence:
             self._travel(-1 if name == "undo" else 1, random.randint(1, 3))
         elif name == "save":
             bpy.ops.wm.save_as_mainfile(filepath=str(self.saved))
-            bpy.ops.wm.save_as_mainfile(filepath=str(self.library), copy=True)
+            if not bpy.data.libraries:
+                bpy.ops.wm.save_as_mainfile(filepath=str(self.library), copy=True)
         elif name == "reload":
             self._open(self.saved)
         else:
