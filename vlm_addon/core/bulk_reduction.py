@@ -11,17 +11,21 @@ one in a Python loop: a vertex goes where its chain of collapses ends.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from .mesh_topology import Bool, Int64, closed_shells, cut_to_manifold, half_edges, sum_by
+from .morton import morton_codes
 from .scene import Float64
 
 ATTEMPTS = 6
 # Triangles from which a group is worth a run of its own, the least a run is asked to leave, and the share of a group
 # that a run must remove to be worth it.
 LARGE_GROUP = 1000
+# Triangles of one run at most: some tenths of a second, in which nothing can be cancelled.
+LARGEST_RUN = 100_000
 LEAST_BUDGET = 8
 WORTHWHILE = 0.7
 # fast_simplification keeps the mesh in variables of its module.
@@ -39,19 +43,31 @@ class Reduced:
     vertex_map: Int64
 
 
-def reduce_groups(positions: Float64, triangles: Int64, group: Int64, weight: Float64, target: int) -> Reduced:
+def reduce_groups(
+    positions: Float64,
+    triangles: Int64,
+    group: Int64,
+    weight: Float64,
+    target: int,
+    report: Callable[[float], None] = lambda share: None,
+) -> Reduced:
     """About `target` triangles, or more, shared among the groups, with the lines between groups in place.
 
     Half of them by weight, because light comes from there, and half by number of triangles, because a detailed shape
     needs some whatever its size.
 
     positions: (v, 3). triangles: (t, 3), an oriented manifold with border. group: (t,). weight: (t,) non-negative.
+    report: called with the share of the work that is done before each part of a few tenths of a second, may raise.
     """
+    group = _in_blocks(positions, triangles, group)
     apart, origin = _cut_between_groups(triangles, group, len(positions))
     points = positions[origin]
     kept = np.ones(len(triangles), bool)
     vertex_map = np.arange(len(points))
+    done = 0
     for members, budget in _shares(group, weight, target):
+        report(done / len(triangles))
+        done += len(members)
         part = reduce_roughly(points, apart[members], budget)
         kept[members] = False
         kept[members[part.source_triangle]] = True
@@ -63,6 +79,21 @@ def reduce_groups(positions: Float64, triangles: Int64, group: Int64, weight: Fl
     whole_map[origin] = origin[vertex_map]
     source_triangle = np.flatnonzero(kept)
     return Reduced(moved, whole_map[triangles[source_triangle]], source_triangle, whole_map)
+
+
+def _in_blocks(positions: Float64, triangles: Int64, group: Int64) -> Int64:
+    """(t,) groups of which large ones are cut into blocks along the Z-order curve: no run takes long, and none sees the
+    other's triangles, whose common lines stay for the fine part."""
+    size = np.bincount(group)
+    if size.max(initial=0) <= LARGEST_RUN:
+        return group
+    order = np.lexsort([morton_codes(positions[triangles].mean(axis=1)), group])
+    place = np.arange(len(group)) - np.concatenate([[0], np.cumsum(size)])[group[order]]
+    blocks = -(-size // LARGEST_RUN)
+    block = place * blocks[group[order]] // np.maximum(size[group[order]], 1)
+    number = np.empty(len(group), np.int64)
+    number[order] = block + np.concatenate([[0], np.cumsum(blocks)])[group[order]]
+    return number
 
 
 def _cut_between_groups(triangles: Int64, group: Int64, vertex_count: int) -> tuple[Int64, Int64]:

@@ -21,6 +21,8 @@ ROUGH_LEAST = 4000
 # The factor falls to this where it would leave more than so many triangles, which take long and gain little.
 ROUGH_FACTOR_OF_MANY, ROUGH_MANY = 2.5, 40_000
 WORTHWHILE = 1.3
+# Share of the time that the rough reduction takes.
+ROUGH_TIME = 0.7
 # Detail from which triangles are reduced apart from the others.
 DETAILED = 1.5
 # Share of the budget that the least forms of all shells may take before the weakest shells are left out: to show small
@@ -56,20 +58,35 @@ def reduce_surface(
         return _selected(surface, solid)
     rows = np.flatnonzero(_strongest_shells(surface, solid, target))
     weight = surface.weight() / np.where(surface.areas > 0, surface.areas, 1.0)
+    begun = 0.0
     start = Reduced(surface.positions, surface.triangles[rows], np.arange(len(rows)), np.arange(len(surface.positions)))
     rough_target = int(min(ROUGH_FACTOR * target, max(ROUGH_FACTOR_OF_MANY * target, ROUGH_MANY)))
     if len(rows) > WORTHWHILE * max(rough_target, ROUGH_LEAST):
         power = (weight * surface.areas)[rows]
         start = reduce_groups(
-            surface.positions, surface.triangles[rows], _alike(surface)[rows], power, max(rough_target, ROUGH_LEAST)
+            surface.positions,
+            surface.triangles[rows],
+            _alike(surface)[rows],
+            power,
+            max(rough_target, ROUGH_LEAST),
+            lambda share: report(ROUGH_TIME * share),
         )
+        begun = ROUGH_TIME
     left = rows[start.source_triangle]
     used, triangles = np.unique(start.triangles, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
     centre, size = surface.positions[used].mean(axis=0), surface.diagonal
     positions = (start.positions[used] - centre) / size
     power = weight[left] * _areas(positions, triangles)
-    collapsed = collapse_edges(positions, triangles, surface.group[left], power, target, surface.normals[left], report)
+    collapsed = collapse_edges(
+        positions,
+        triangles,
+        surface.group[left],
+        power,
+        target,
+        surface.normals[left],
+        lambda share: report(begun + (1.0 - begun) * share),
+    )
     collapsed = _within_budget(collapsed, surface, left, target)
     number = np.full(len(surface.positions), -1, np.int64)
     number[used] = np.arange(len(used))

@@ -9,6 +9,7 @@ nearby, so that their power is kept.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,8 +36,13 @@ class Regions:
     adopted: Bool
 
 
-def assign_regions(surface: SourceSurface, reduced: ReducedSurface) -> Regions:
-    """The region of each light; only one that faces away from everything near it is left without."""
+def assign_regions(
+    surface: SourceSurface, reduced: ReducedSurface, report: Callable[[float], None] = lambda share: None
+) -> Regions:
+    """The region of each light; only one that faces away from everything near it is left without.
+
+    report: called with the share of the work that is done, may raise.
+    """
     positions, triangles, source_triangle = reduced.positions, reduced.triangles, reduced.source_triangle
     light_of = np.full(len(surface.triangles), -1, np.int64)
     lights = _Lights(positions[triangles], surface.group[source_triangle])
@@ -47,6 +53,7 @@ def assign_regions(surface: SourceSurface, reduced: ReducedSurface) -> Regions:
     around = vertex_faces(triangles, len(positions))
     open_rows = np.flatnonzero((light_of < 0) & ~adopted)
     for first in range(0, len(open_rows), ROWS_PER_BATCH):
+        report(first / len(open_rows))
         rows = open_rows[first : first + ROWS_PER_BATCH]
         light_of[rows] = _nearest_around(surface, lights, rows, merged[rows], around)
     if adopted.any():
@@ -91,7 +98,6 @@ class _Lights:
             best = np.minimum(best, rest_x * rest_x + rest_y * rest_y)
             inside &= side_x * dy - side_y * dx >= 0
         return np.where(inside, 0.0, best) + height * height
-
 
     def shine_on(self, points: Float64, normals: Float64, light: Int64) -> Bool:
         """(n,) whether any of the light beside it reaches each point (n, 3) of a surface with that normal."""

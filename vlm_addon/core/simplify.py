@@ -135,7 +135,7 @@ def create_light_mesh(
         raise InvalidInput("simplification", problem, "ask for at least 1 of each")
     clock = _Clock(progress)
     clock.start(0.0, "weld")
-    surface = join_surface(meshes)
+    surface = join_surface(meshes, lambda share: step(progress, 0.1 * share, "weld"))
     whole, kept = surface, keep if keep is not None else empty_light_mesh()
     held = kept_regions(kept, surface.corners, surface.normals)
     if len(kept):
@@ -150,12 +150,18 @@ def create_light_mesh(
         clock.stop()
         return _nothing(meshes, whole, kept, held, clock)
     clock.start(0.6, "regions")
-    regions = assign_regions(surface, lights)
+    regions = assign_regions(surface, lights, lambda share: step(progress, 0.6 + 0.1 * share, "regions"))
     clock.start(0.7, "place")
     own = _region_rows(regions, ~regions.adopted, len(lights.triangles))
     placement = place_behind(lights.positions, lights.triangles, own, surface.corners)
     clock.start(0.85, "withdraw")
-    withdrawal = withdraw(placement.positions, lights.triangles, own, surface.corners)
+    withdrawal = withdraw(
+        placement.positions,
+        lights.triangles,
+        own,
+        surface.corners,
+        lambda share: step(progress, 0.85 + 0.05 * share, "withdraw"),
+    )
     clock.start(0.9, "sample")
     placed = replace(lights, triangles=withdrawal.triangles)
     light_mesh = _coloured(surface, placed, regions, withdrawal.positions, settings)

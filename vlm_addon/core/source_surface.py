@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,8 +73,11 @@ class SourceSurface:
         return self.importance() * self.detail**DETAIL_POWER
 
 
-def join_surface(meshes: Sequence[Mesh]) -> SourceSurface:
-    """All triangles of `meshes` as one surface. Raises InvalidInput on values that are not finite or negative."""
+def join_surface(meshes: Sequence[Mesh], report: Callable[[float], None] = lambda share: None) -> SourceSurface:
+    """All triangles of `meshes` as one surface. Raises InvalidInput on values that are not finite or negative.
+
+    report: called with the share of the work that is done, may raise.
+    """
     for mesh in meshes:
         _require_usable(mesh)
     filled = [mesh for mesh in meshes if len(mesh.triangles)]
@@ -83,17 +86,20 @@ def join_surface(meshes: Sequence[Mesh]) -> SourceSurface:
     owner = np.repeat(np.arange(len(filled)), [len(mesh.positions) for mesh in filled])
     used, triangles = np.unique(triangles, return_inverse=True)
     positions, triangles = positions[used], triangles.reshape(-1, 3)
+    report(0.2)
     welded = weld(positions, owner[used])[triangles]
     a, b, c = welded.T
     detail = np.concatenate([_detail(mesh) for mesh in filled]) if filled else np.zeros(0)
     unlit = triangles[detail <= 0]
     original = np.flatnonzero((a != b) & (b != c) & (c != a) & (detail > 0))
+    report(0.5)
     cut, origin = cut_to_manifold(welded[original], len(positions))
     sides = positions[unlit[:, 1:]] - positions[unlit[:, :1]]
     unlit_area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
     positions, mesh_of = positions[origin], mesh_of[original]
     normals = np.cross(positions[cut[:, 1]] - positions[cut[:, 0]], positions[cut[:, 2]] - positions[cut[:, 0]])
     doubled = np.linalg.norm(normals, axis=1)
+    report(0.8)
     shell, closed = closed_shells(cut, len(positions))
     attributes = {name: _gather(filled, name)[original] for name in ("reflectance", "emission")}
     tag = _gather(filled, "tag_ids").astype(np.int64)[original]
