@@ -140,6 +140,20 @@ def test_on_curved_surfaces_no_light_stands_in_front(hollow):
     assert min(turned) > 0.0
 
 
+def test_a_grid_in_a_hollow_lies_behind_it():
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=2.0, segments=96, ring_count=48)
+    ball = bpy.context.object
+    ball.data.flip_normals()
+    points, rings = rectangle(
+        np.array([-1.0, -1.0, -1.5]), np.array([1.0, 1.0, -1.5]), UP[0], np.array([1.0, 0.0, 0.0]), 4, 4
+    )
+    points *= 2.0 / np.linalg.norm(points, axis=1, keepdims=True)
+    draw_lights.draw(bpy.context, points, rings, repeated(UP[0], 16), 0.0)
+    made = bpy.context.object
+    assert len(made.data.polygons) == 32
+    assert highest_over_surface(made, ball) < 0.0
+
+
 def test_rectangles_of_a_grid_share_their_vertices(red_plane):
     points, rings = rectangle(SQUARE[0], SQUARE[2], UP[0], np.zeros(3), 3, 2)
     draw_lights.draw(bpy.context, points, rings, repeated(UP[0], 6), 0.0)

@@ -19,7 +19,7 @@ from ..core.scene import Float64
 from .draw_surfaces import SurfaceHit, hits_along, surface_under
 from .drawn_faces import Faces, triangles_of
 
-SIDES = ((6, 4), (24, 3))
+SIDES = ((4, 4), (8, 3))
 """Up to so many triangles are cut into so many pieces a side, more of them into COARSE_SIDE."""
 COARSE_SIDE = 2
 
@@ -41,8 +41,8 @@ class Pieces:
     """Small triangles that the faces consist of, and the surface under them.
 
     corners: (p, 3, 3) float64 world. faces, triangles: (p,) the face and the triangle of each. areas: (p,) m². hits:
-    surface under the middle of each, None where there is none. ground: (p, 3, 3), the corners dropped onto the surface,
-    NaN where they miss it.
+    surface under the middle of each, None where there is none. ground: (p, 4, 3), the corners and the middle dropped
+    onto the surface, NaN where they miss it.
     """
 
     corners: Float64
@@ -79,12 +79,14 @@ def pieces_of(faces: Faces, scene: Any, depsgraph: Any, sign: float = 1.0) -> Pi
         normal = vector / double_area
         reach = REACH_SHARE * np.sqrt(0.5 * double_area) + float(np.ptp(placed @ normal))
         points = nodes @ placed
-        dropped = [surface_under(scene, depsgraph, point, normal, reach, sign) for point in points]
+        middles = points[cells].mean(axis=1)
+        dropped = [
+            surface_under(scene, depsgraph, point, normal, reach, sign) for point in np.concatenate([points, middles])
+        ]
         places = np.array([np.full(3, np.nan) if hit is None else hit.location for hit in dropped])
         corners.append(points[cells])
-        ground.append(places[cells])
-        middles = points[cells].mean(axis=1)
-        hits += [surface_under(scene, depsgraph, middle, normal, reach, sign) for middle in middles]
+        ground.append(np.concatenate([places[cells], places[len(points) :, None]], axis=1))
+        hits += dropped[len(points) :]
         areas += [0.5 * double_area / len(cells)] * len(cells)
     count = len(cells)
     return Pieces(
