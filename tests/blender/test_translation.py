@@ -68,6 +68,17 @@ def test_afterwards_blender_shows_english_again(german_blender):
     assert bpy.app.translations.pgettext_iface("Target Triangles") == "Target Triangles"
 
 
+def test_an_operator_that_is_there_has_its_texts():
+    bake = {"bl_idname": "vlm.bake", "bl_label": "Bake", "__doc__": "Make lights"}
+    operator = type("VLM_OT_bake", (bpy.types.Operator,), bake)
+    bpy.utils.register_class(operator)
+    try:
+        texts = translation.messages()["de_DE"]
+    finally:
+        bpy.utils.unregister_class(operator)
+    assert (texts["Operator", "Bake"], texts["*", "Make lights"]) == german.OPERATORS["vlm.bake"]
+
+
 def test_an_operator_that_is_not_there_stops_nothing():
     texts = translation.messages()["de_DE"]
     assert ("Operator", "Light Scene") not in texts

@@ -159,9 +159,10 @@ def in_german():
     """The sidebar in German, to be looked at, and what Blender says for some texts."""
     view = bpy.context.preferences.view
     view.language, view.use_translate_interface = "de_DE", True
+    yield SECONDS_FOR_REDRAW
     with in_view():
         area = bpy.context.area
-    area.spaces.active.show_region_ui = True
+        area.spaces.active.show_region_ui = True
     yield SECONDS_FOR_REDRAW
     next(region for region in area.regions if region.type == "UI").active_panel_category = "VLM"
     yield SECONDS_FOR_REDRAW

@@ -28,10 +28,10 @@ def messages() -> dict[str, Messages]:
         texts = {(DEFAULT_CONTEXT, text): told for text, told in (catalogue.LABELS | catalogue.PROPERTIES).items()}
         texts |= {(OPERATOR_CONTEXT, text): told for text, told in catalogue.BUTTONS.items()}
         for name, (label, tooltip) in catalogue.OPERATORS.items():
-            operator = getattr(bpy.types, class_name(name), None)
-            if operator is not None:
-                texts[OPERATOR_CONTEXT, operator.bl_rna.name] = label
-                texts[DEFAULT_CONTEXT, operator.bl_rna.description] = tooltip
+            if hasattr(bpy.types, class_name(name)):
+                operator = getattr(bpy.ops.vlm, name.split(".")[1]).get_rna_type()
+                texts[OPERATOR_CONTEXT, operator.name] = label
+                texts[DEFAULT_CONTEXT, operator.description] = tooltip
         found[language] = texts
     return found
 
