@@ -103,3 +103,9 @@ def test_too_many_links_are_avoided_by_sharing_tags_within_a_group_and_no_pair_i
     monkeypatch.setattr(tag_pairs, "MOST_LINKS", 9)
     with pytest.raises(InvalidInput, match="more than 9 links"):
         add_tags(*pairs.T, *NONE, no_links(), FIRST)
+
+
+def test_too_many_links_between_ids_that_there_are_are_refused(monkeypatch):
+    monkeypatch.setattr(tag_pairs, "MOST_LINKS", 1)
+    with pytest.raises(InvalidInput, match="2 links between ids that there are"):
+        add_tags([0, 1], [0, 1], [7, 8, 0, 0, 0, 0], [30, 31, 0, 0, 0], no_links(), FIRST)

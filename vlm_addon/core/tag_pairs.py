@@ -69,6 +69,12 @@ def add_tags(
     bare = face_tags[faces] == UNTAGGED
     between = np.stack([light_tags[lights[~bare]], face_tags[faces[~bare]]], axis=1)
     known = np.concatenate([np.asarray(links, np.int64).reshape(-1, 2), between])
+    known = np.unique(known, axis=0)
+    if len(known) > MOST_LINKS:
+        problem = (
+            f"{len(known):,} links between ids that there are would be needed, at most {MOST_LINKS:,} are possible"
+        )
+        raise InvalidInput("tags", problem, "clear those of the lights and of what they stand for, then pair them all")
     pairs = np.unique(np.stack([faces[bare], light_tags[lights[bare]]], axis=1), axis=0).astype(np.int64)
     groups = None if group_of_face is None else np.asarray(group_of_face, np.int64)
     added = _tag_faces(pairs, face_tags, groups, first_tag + len(fresh), MOST_LINKS - len(known))
