@@ -54,8 +54,8 @@ class ScreenFacts:
 
 @dataclass(frozen=True)
 class LightMeshFacts:
-    """Of a virtual light mesh. reflecting: lights that reflect; glowing: lights that shine by themselves. links: pairs of a
-    light's tag and one that such lights leave out beside their own."""
+    """Of a virtual light mesh. reflecting: lights that reflect; glowing: lights that shine by themselves. links: pairs
+    of a light's tag and one that such lights leave out beside their own."""
 
     lights: int
     reflecting: int
