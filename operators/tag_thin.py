@@ -9,7 +9,7 @@ from ..vlm_addon.blender.long_operator import LongOperator
 
 class VLM_OT_tag_thin(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)
     """Find thin bodies and sheets that are seen from both sides, and let their faces leave out the lights that stand \
-for them; tags that there are stay"""
+for them; tags that there are stay. Up to a minute for large scenes"""
 
     bl_idname = "vlm.tag_thin"
     bl_label = "Tag Thin Surfaces"
