@@ -27,6 +27,8 @@ STEP_PIXELS = 18
 LEFT, RIGHT = 0.3, 0.8
 """Shares of the sidebar's width: buttons that share a row are asked for one by one."""
 PAGES = 4
+CLICKS = 2
+"""The first click on a sidebar that has just been scrolled may go to its scrolling."""
 SCROLLS_PER_PAGE = 12
 PLACE = {"page": 0}
 """How far the sidebar is scrolled."""
@@ -201,8 +203,11 @@ def press_button(name, page, place, situation):
     start = time.monotonic()
     yield from to_page(page)
     before, operators = content(), len(bpy.context.window_manager.operators)
-    yield from click(place)
-    yield SECONDS_FOR_REDRAW
+    for _ in range(CLICKS):
+        yield from click(place)
+        yield SECONDS_FOR_REDRAW
+        if not nothing_runs() or content() != before or len(bpy.context.window_manager.operators) > operators:
+            break
     waited = not nothing_runs()
     for _ in range(20):
         if nothing_runs():
