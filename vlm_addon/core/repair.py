@@ -21,9 +21,12 @@ from .nearest_lights import pair_nearest
 from .own_tags import tagged_regions
 from .placement import insets, intrusions, place_behind
 from .scene import UNTAGGED, Float32, Float64, Int32, Mesh
+from .withdrawal import own_shares
 
 # The most of the light that arrives that a surface can send back.
 BRIGHTEST = 1.0
+# Points of each region at which its own light tells whether a move has made it worse.
+JUDGED_POINTS = 32
 
 
 def _no_rows() -> Int64:
@@ -189,9 +192,17 @@ def _behind(work: _Work) -> Repair:
     mesh = work.light_mesh
     corners = _source_corners(work.meshes)
     regions = _rows_of(work.regions(), len(mesh))
+    triangles = mesh.triangles.astype(np.int64)
     # Only what the chosen lights stand for pushes: the others stay, but for the vertices that they share.
     pushing = _only(regions, work.chosen)
-    placed = place_behind(mesh.vertices, mesh.triangles.astype(np.int64), pushing, corners)
+    placed = place_behind(mesh.vertices, triangles, pushing, corners)
+    before, after = (
+        own_shares(positions[triangles], pushing, corners, JUDGED_POINTS)
+        for positions in (mesh.vertices, placed.positions)
+    )
+    if (after > before).any():
+        # A light may stand in front of a part of its region that it does not shine on, and do so where it is pushed.
+        placed = place_behind(mesh.vertices, triangles, _only(regions, work.chosen & (after <= before)), corners)
     moved = replace(mesh, vertices=placed.positions)
     ratio = mesh.areas / np.where(moved.areas > 0, moved.areas, 1.0)
     strength = (mesh.strength * np.where(moved.areas > 0, ratio, 1.0)).astype(np.float32)

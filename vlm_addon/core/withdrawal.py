@@ -26,6 +26,8 @@ from .triangle_tree import TriangleTree, build_tree
 ROUGH_POINTS, FINE_POINTS = 16, 32
 # Mean share of a light's radiosity that its own region may receive.
 ALLOWED = 5e-3
+# Mean own light of all surfaces, of lights of radiosity 1, that the least offenders may leave together.
+NEGLIGIBLE = 1e-4
 # Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
 SHRINKS = (1.0, 0.7, 0.45, 0.25)
 DEPTHS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.6)
@@ -64,7 +66,7 @@ def withdraw(
     """
     corners = positions[triangles]
     own = own_shares(corners, regions, source_corners, ROUGH_POINTS)
-    offenders = np.flatnonzero(own > ALLOWED)
+    offenders = _worst(own, _areas_of(regions, source_corners))
     moved = np.zeros(len(corners), bool)
     if not len(offenders):
         return Withdrawal(positions, triangles, moved, own)
@@ -74,7 +76,9 @@ def withdraw(
         report(first / len(offenders))
         rows = offenders[first : first + LIGHTS_PER_BATCH]
         part = _rows_of(regions, rows)
-        placed, left = _best_places(corners[rows], inset[rows], part, source_corners, tree)
+        # By themselves: all that follows takes as long as there are source triangles.
+        alone = Rows(np.arange(len(part.values)), part.starts)
+        placed, left = _best_places(corners[rows], inset[rows], alone, source_corners[part.values], tree)
         changed = left < own[rows]
         corners[rows[changed]], own[rows[changed]], moved[rows[changed]] = placed[changed], left[changed], True
     apart = triangles.copy()
@@ -82,6 +86,14 @@ def withdraw(
     used, apart = np.unique(apart, return_inverse=True)
     every = np.concatenate([positions, corners[moved].reshape(-1, 3)])
     return Withdrawal(every[used], apart.reshape(-1, 3), moved, own)
+
+
+def _worst(own: Float64, areas: Float64) -> Int64:
+    """The lights with more than ALLOWED own light, most of it first, without those that matter to no picture."""
+    received = own * areas / max(float(areas.sum()), np.finfo(float).tiny)
+    order = np.argsort(-received, kind="stable")
+    left = received.sum() - np.cumsum(received[order]) + received[order]
+    return order[(own[order] > ALLOWED) & (left > NEGLIGIBLE)]
 
 
 def own_shares(corners: Float64, regions: Rows, source_corners: Float64, points: int) -> Float64:
