@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights drawn with the mouse in Blender's window: drive_drawing.py draws, the tests read on.
+
+Blender is found as for test_window.py.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from tests.gui.test_window import ROOT, command
+
+pytestmark = pytest.mark.full
+
+MINUTES = 5
+DRIVE = Path(__file__).with_name("drive_drawing.py")
+CORNELL_BOX = ROOT / "sample_blends" / "cornell_box.blend"
+WALLS = {"back wall": 0, "red wall": 0, "green wall": 1}
+"""The channel in which the wall reflects most."""
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory):
+    """What drive_drawing.py wrote, with `output` added."""
+    chroot = os.environ.get("VLM_BLENDER_CHROOT")
+    if not chroot and not (shutil.which("blender") and shutil.which("xvfb-run") and shutil.which("import")):
+        pytest.skip("no Blender with a window: set VLM_BLENDER_CHROOT, or install blender, xvfb and imagemagick")
+    folder = tmp_path_factory.mktemp("window")
+    outside = Path(tempfile.mkdtemp(prefix="vlm-drawing-", dir=f"{chroot}/root")) if chroot else folder
+    inside = Path("/root") / outside.name if chroot else folder
+    try:
+        subprocess.run([sys.executable, ROOT / "tools" / "package.py", "--output", outside], check=True)
+        (package,) = outside.glob("*-linux_x64.zip")
+        shutil.copy(DRIVE, outside / "drive.py")
+        shutil.copy(CORNELL_BOX, outside)
+        done = subprocess.run(
+            command(chroot, inside, package.name), capture_output=True, text=True, timeout=60 * MINUTES
+        )
+        output = done.stdout + done.stderr
+        if not (outside / "story.json").exists():
+            pytest.fail(f"Blender ended early:\n{output}")
+        keep = os.environ.get("VLM_SCREENSHOTS")
+        for path in [*outside.glob("*.png"), outside / "story.json"] if keep else ():
+            shutil.copy(path, keep)
+        return {**json.loads((outside / "story.json").read_text()), "output": output}
+    finally:
+        if chroot:
+            shutil.rmtree(outside)
+
+
+def test_the_story_came_to_its_end(story):
+    assert "error" not in story, story["error"]
+    assert story["finished"]
+
+
+def test_nothing_was_raised_on_the_way(story):
+    assert "Traceback" not in story["output"], story["output"]
+
+
+def test_nothing_changes_before_a_stroke_ends_and_esc_leaves_nothing(story):
+    assert story["before the end"] == 0
+    assert story["after Esc"] == [0, 0, 0]
+
+
+def test_the_wheel_zooms_amid_a_stroke(story):
+    assert story["zoomed amid a stroke"]
+
+
+@pytest.mark.parametrize(
+    "name", ["back wall", "red wall", "green wall", "floor", "ceiling", "block front", "block side"]
+)
+def test_a_polygon_on_a_flat_surface_is_one_light(story, name):
+    assert story["made"][name]["lights"] == 1
+
+
+@pytest.mark.parametrize("name", ["ball, left", "ball, right", "freehand on the ball"])
+def test_a_polygon_on_the_ball_is_several_lights(story, name):
+    assert story["made"][name]["lights"] > 1
+
+
+@pytest.mark.parametrize(("name", "channel"), WALLS.items())
+def test_lights_take_the_colour_of_their_wall(story, name, channel):
+    color = story["made"][name]["color"]
+    assert max(color) == pytest.approx(color[channel], rel=0.01)
+    assert (min(color) < 0.2 * max(color)) == (name != "back wall")
+
+
+def test_lights_face_into_the_room(story):
+    normals = {name: told["normal"] for name, told in story["made"].items() if "normal" in told}
+    assert normals["red wall"][0] > 0.99
+    assert normals["green wall"][0] < -0.99
+    assert normals["floor"][2] > 0.99
+    assert normals["ceiling"][2] < -0.99
+
+
+def test_each_stroke_is_one_undo_step(story):
+    undone, redone = story["undo and redo"]
+    assert undone == story["made"]["freehand on the ball"]["lights"]
+    assert redone == 0
+
+
+def test_each_tool_does_its_work(story):
+    made = {name: told["lights"] for name, told in story["made"].items()}
+    assert made["rectangle"] == 6
+    assert made["round the corner"] > 1
+    assert made["cut"] == 1
+    assert made["erase"] == -3
+
+
+def test_it_works_in_edit_mode_and_in_orthographic_views(story):
+    assert story["made"]["in edit mode"]["lights"] == 1
+    assert story["made"]["orthographic"]["lights"] == 1
+
+
+def test_no_stroke_is_left_running(story):
+    assert [value for name, value in story.items() if name.startswith("left after")] == [0] * 5
