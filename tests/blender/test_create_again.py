@@ -12,6 +12,7 @@ from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.properties import ensure_scene_settings
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.progress import silent
+from vlm_addon.core.tag_pairs import FIRST_AUTOMATIC
 
 ensure_scene_settings()
 
@@ -57,6 +58,14 @@ def test_without_locks_it_is_the_same_again(cube_lights):
     after = extract().light_mesh
     assert np.array_equal(after.vertices, before.vertices)
     assert np.array_equal(after.colour, before.colour)
+
+
+def test_a_light_mesh_with_tags_by_pairing_is_tagged_again(cube_lights):
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings(), True)(silent))
+    before = set(read_faces(cube_lights, "vlm_tag").tolist())
+    assert min(before) >= FIRST_AUTOMATIC
+    again()
+    assert min(read_faces(cube_lights, "vlm_tag").tolist()) >= FIRST_AUTOMATIC
 
 
 def test_more_locked_lights_than_are_asked_for_is_refused_and_changes_nothing(cube_lights):

@@ -13,11 +13,12 @@ from ..bake import BakeSettings
 from ..core.errors import InvalidInput
 from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
+from ..core.tag_pairs import FIRST_AUTOMATIC
 from .authoring import Made, from_objects
 from .color_space import convert, working_to_rec709
 from .light_faces import read_faces
 from .light_mesh_io import extract
-from .light_meshes import require_editable, source_names, sources
+from .light_meshes import require_editable, source_names, sources, tags_of
 from .names import AREA_SCALE_ATTRIBUTE, COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, is_light_mesh
 
 
@@ -34,9 +35,13 @@ def again_problem(context: Any) -> str | None:
 
 
 def again(context: Any, settings: BakeSettings, tag_regions: bool) -> Callable[[Progress], Made]:
-    """Work that makes the active light mesh of its sources again. Raises InvalidInput where it cannot be changed."""
+    """Work that makes the active light mesh of its sources again. Raises InvalidInput where it cannot be changed.
+
+    tag_regions: as for creation; a light mesh that pairing has tagged is tagged again in any case.
+    """
     thing = context.active_object
     require_editable(thing)
+    tag_regions |= bool((tags_of(thing) >= FIRST_AUTOMATIC).any())
     things = [source for source in sources(thing, context.scene) if source is not None]
     locked = read_faces(thing, LOCK_ATTRIBUTE) != 0
     keep = locked_lights(thing, locked) if locked.any() else None
