@@ -220,7 +220,7 @@ def _light_mesh_faults(thing, scene, light_meshes_module):
             found.append(f"{thing.name!r} does not find its source {same[0].name!r}")
         elif source is not None and there and source not in there and not _is_copy(source, there, number):
             found.append(f"{thing.name!r} takes {source.name!r} for its source {there[0].name!r}")
-        elif source is not None and not there and NO_MARK not in (mark, origin) and source.get(ORIGIN) != origin:
+        elif source is not None and not there and NO_MARK not in (mark, origin) and _is_other(source, origin):
             found.append(f"{thing.name!r} takes {source.name!r} for a source that is gone")
     return found
 
@@ -228,6 +228,11 @@ def _light_mesh_faults(thing, scene, light_meshes_module):
 def _is_copy(source, there, number):
     """Whether an object shares its id with the right ones, as appended and duplicated copies do: its name decides."""
     return source.get("vlm_id") == number and any(each.get("vlm_id") == number for each in there)
+
+
+def _is_other(source, origin):
+    """Whether an object is no copy of the one that is gone, nor one without an id that has its name."""
+    return source.get(ORIGIN) != origin and "vlm_id" in source
 
 
 def _attribute_faults(mesh):
