@@ -25,9 +25,9 @@ from .triangle_tree import TriangleTree, build_tree
 # Points of each region at which its own light is measured, first of all lights, then of those that may withdraw.
 ROUGH_POINTS, FINE_POINTS = 16, 32
 # Mean share of a light's radiosity that its own region may receive.
-ALLOWED = 5e-3
+ALLOWED = 3e-3
 # Mean own light of all surfaces, of lights of radiosity 1, that the least offenders may leave together.
-NEGLIGIBLE = 1e-4
+NEGLIGIBLE = 3e-5
 # Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
 SHRINKS = (1.0, 0.7, 0.45, 0.25)
 DEPTHS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.6)
@@ -90,9 +90,11 @@ def withdraw(
 
 def _worst(own: Float64, areas: Float64) -> Int64:
     """The lights with more than ALLOWED own light, most of it first, without those that matter to no picture."""
-    received = own * areas / max(float(areas.sum()), np.finfo(float).tiny)
+    total = float(areas.sum())
+    received = own * areas / (total if total > 0.0 else 1.0)
     order = np.argsort(-received, kind="stable")
-    left = received.sum() - np.cumsum(received[order]) + received[order]
+    # Of each with those that follow.
+    left = np.cumsum(received[order][::-1])[::-1]
     return order[(own[order] > ALLOWED) & (left > NEGLIGIBLE)]
 
 
