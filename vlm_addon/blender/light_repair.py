@@ -177,10 +177,10 @@ def _write_repair(scene: Any, made: Repaired) -> list[str]:
         if not _touches(made, rows, vertices):
             continue
         moves = made.repair.vertices is not None and not _is_rigid(thing, made.origins.vertex_counts[number])
-        if thing is None or name in seen or moves or (made.origins.faces[rows] < 0).any():
+        if thing is None or thing.data.name in seen or moves or (made.origins.faces[rows] < 0).any():
             left_out.append(name)
             continue
-        seen.add(name)
+        seen.add(thing.data.name)
         _write_values(thing, made, rows)
         _write_geometry(thing, made, rows, vertices)
     return left_out
