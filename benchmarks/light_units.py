@@ -23,7 +23,7 @@ from PIL import Image
 
 from benchmarks.support import open_sample, quiet, timed
 from vlm_addon.blender.cycles_reference import Reference, render_reference
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.lamps import is_soft
 from vlm_addon.core.scene import DIFFUSE, PRINCIPLED, Float32
 from vlm_addon.measure.contact_sheet import error_map, side_by_side

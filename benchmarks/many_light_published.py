@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import bpy
 
 from benchmarks.support import SAMPLE_BLENDS, open_sample, quiet
-from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.core.scene import SceneSnapshot
 
 LIGHTS = (512, 1024, 2048)

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.support import open_sample, quiet
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.light_mesh_io import Extraction
+from vlm_addon.blender.extraction.light_mesh_io import Extraction
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.scene import Float32
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh

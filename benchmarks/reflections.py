@@ -18,7 +18,7 @@ import numpy as np
 from mathutils import Vector
 
 from benchmarks.support import displayed, quiet
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.exr import image_of, read_exr
 from vlm_addon.core.scene import Float32
 from vlm_addon.render.device import Device

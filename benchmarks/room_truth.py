@@ -12,7 +12,7 @@ import bpy
 
 from benchmarks.support import open_sample, quiet
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.core.metrics import relative_rmse
 from vlm_addon.core.simplify import create_light_mesh, subdivide_light_mesh
 from vlm_addon.render.device import Device

@@ -34,7 +34,7 @@ import numpy as np
 
 from benchmarks.many_light import ProcessorTimer
 from benchmarks.support import ROOT, quiet
-from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.core.scene import PRINCIPLED, SPOT, SUN, Float64, Light, SceneSnapshot
 from vlm_addon.render.device import Device

@@ -26,7 +26,7 @@ from benchmarks.scene_bounce import Bounce, spread_points, triangle_lights
 from benchmarks.simplify_plot import draw
 from benchmarks.simplify_rivals import RIVALS, Soup, joined, nearest_lights
 from benchmarks.support import MODELS, SAMPLE_BLENDS, open_sample, quiet
-from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
 from vlm_addon.core.mesh_topology import Int64, rows_by_key, sum_by

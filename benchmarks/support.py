@@ -14,8 +14,8 @@ from typing import TypeVar
 import numpy as np
 from PIL import Image
 
+from vlm_addon.blender.extraction.light_mesh_io import Extraction, extract
 from vlm_addon.blender.image_io import write_image
-from vlm_addon.blender.light_mesh_io import Extraction, extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.core.scene import Float32
 

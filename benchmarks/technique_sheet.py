@@ -16,7 +16,7 @@ from PIL import Image
 
 from benchmarks.support import ALONE, displayed, open_sample, quiet, rgb
 from vlm_addon.blender.cycles_reference import Reference, render_reference
-from vlm_addon.blender.light_mesh_io import Extraction
+from vlm_addon.blender.extraction.light_mesh_io import Extraction
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.metrics import flip, relative_rmse
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.support import ALONE, SAMPLE_BLENDS, quiet
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.light_mesh_io import Extraction, extract
+from vlm_addon.blender.extraction.light_mesh_io import Extraction, extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.core.bounce_parts import Bools
 from vlm_addon.core.metrics import relative_rmse

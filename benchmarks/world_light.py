@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.support import ALONE, quiet
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.environment import map_directions, map_solid_angles
 from vlm_addon.core.lamps import lamp_irradiance
 from vlm_addon.core.light_mesh import VirtualLightMesh

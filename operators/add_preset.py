@@ -5,7 +5,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.types import Operator
 
-from ..vlm_addon.blender import setting_presets
+from ..vlm_addon.blender.interface import setting_presets
 
 
 class VLM_OT_add_preset(AddPresetBase, Operator):  # noqa: N801 (Blender's naming of classes)

@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, bake_grid
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.baking import bake_grid
 from ..vlm_addon.blender.long_operator import LongOperator
 
 

@@ -3,7 +3,8 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, checking
+from ..vlm_addon.blender import authoring, checking
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.long_operator import LongOperator
 
 

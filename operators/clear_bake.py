@@ -3,7 +3,8 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, bake_grid
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.baking import bake_grid
 from ..vlm_addon.core.errors import VlmError
 
 

@@ -3,7 +3,8 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, light_tags
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.tagging import light_tags
 from ..vlm_addon.core.errors import VlmError
 
 

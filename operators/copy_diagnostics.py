@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender.diagnostics import diagnostics
+from ..vlm_addon.blender.support.diagnostics import diagnostics
 
 
 class VLM_OT_copy_diagnostics(Operator):  # noqa: N801 (Blender's naming of classes)

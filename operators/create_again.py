@@ -5,8 +5,8 @@ from bpy.types import Operator
 
 from ..vlm_addon.bake import BakeSettings
 from ..vlm_addon.blender import authoring, create_again
+from ..vlm_addon.blender.interface.properties import property_annotations, settings_from
 from ..vlm_addon.blender.long_operator import LongOperator
-from ..vlm_addon.blender.properties import property_annotations, settings_from
 
 
 class VLM_OT_create_again(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)

@@ -5,9 +5,10 @@ import bpy
 from bpy.types import Operator
 
 from ..vlm_addon.bake import BakeSettings
-from ..vlm_addon.blender import authoring, availability
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.interface import availability
+from ..vlm_addon.blender.interface.properties import property_annotations, settings_from
 from ..vlm_addon.blender.long_operator import LongOperator
-from ..vlm_addon.blender.properties import property_annotations, settings_from
 from ..vlm_addon.core.errors import InvalidInput
 
 

@@ -3,7 +3,9 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, draw_erase, draw_gestures, draw_operators, draw_points
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.drawing import draw_erase, draw_gestures, draw_operators, draw_points
+from ..vlm_addon.blender.interface import availability
 
 
 class VLM_OT_draw_cut(draw_gestures.CutGesture, draw_operators.Stroke, Operator):  # noqa: N801 (Blender's naming of classes)

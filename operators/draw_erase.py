@@ -4,7 +4,9 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, draw_erase, draw_gestures, draw_operators, draw_points
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.drawing import draw_erase, draw_gestures, draw_operators, draw_points
+from ..vlm_addon.blender.interface import availability
 
 
 class VLM_OT_draw_erase(draw_gestures.EraseGesture, draw_operators.Stroke, Operator):  # noqa: N801 (Blender's naming of classes)

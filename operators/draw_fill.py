@@ -3,7 +3,8 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, draw_fill, draw_operators
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.drawing import draw_fill, draw_operators
 
 
 class VLM_OT_draw_fill(draw_operators.NewLights, Operator):  # noqa: N801 (Blender's naming of classes)

@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, draw_keys
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.drawing import draw_keys
 
 
 class VLM_OT_draw_key(Operator):  # noqa: N801 (Blender's naming of classes)

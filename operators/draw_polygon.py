@@ -3,7 +3,8 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, draw_gestures, draw_lights, draw_operators, draw_points
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.drawing import draw_gestures, draw_lights, draw_operators, draw_points
 
 
 class VLM_OT_draw_polygon(draw_gestures.PolygonGesture, draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)

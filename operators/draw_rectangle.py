@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, draw_gestures, draw_lights, draw_operators, draw_points, draw_shapes
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.drawing import draw_gestures, draw_lights, draw_operators, draw_points, draw_shapes
 
 
 class VLM_OT_draw_rectangle(draw_gestures.RectangleGesture, draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)

@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, checking, light_repair
+from ..vlm_addon.blender import authoring, checking, light_repair
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.long_operator import LongOperator
 
 

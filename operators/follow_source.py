@@ -4,8 +4,9 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import animation, authoring
-from ..vlm_addon.blender.follow_source import AUTO, WAYS
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.following import animation
+from ..vlm_addon.blender.following.follow_source import AUTO, WAYS
 from ..vlm_addon.core.errors import VlmError
 
 

@@ -4,9 +4,10 @@
 from bpy.types import Operator
 
 from ..vlm_addon.bake import BakeSettings
-from ..vlm_addon.blender import authoring, availability
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.interface import availability
+from ..vlm_addon.blender.interface.properties import property_annotations, settings_from
 from ..vlm_addon.blender.long_operator import LongOperator
-from ..vlm_addon.blender.properties import property_annotations, settings_from
 
 
 class VLM_OT_light_scene(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)

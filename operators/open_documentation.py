@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import documentation
+from ..vlm_addon.blender.support import documentation
 
 
 class VLM_OT_open_documentation(Operator):  # noqa: N801 (Blender's naming of classes)

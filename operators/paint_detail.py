@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, detail_painting
+from ..vlm_addon.blender import authoring, detail_painting
+from ..vlm_addon.blender.interface import availability
 
 
 class VLM_OT_paint_detail(Operator):  # noqa: N801 (Blender's naming of classes)

@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, light_colors, recolor
+from ..vlm_addon.blender import authoring, light_colors, recolor
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.light_meshes import chosen_light_meshes
 from ..vlm_addon.blender.long_operator import LongOperator
 

@@ -3,8 +3,10 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, tag_pairing, tag_separation
+from ..vlm_addon.blender import authoring, tag_separation
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.long_operator import LongOperator
+from ..vlm_addon.blender.tagging import tag_pairing
 
 
 class VLM_OT_repair_tags(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)

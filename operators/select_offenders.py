@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, findings
+from ..vlm_addon.blender import authoring, findings
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.core.errors import VlmError
 
 

@@ -4,7 +4,8 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, light_colors
+from ..vlm_addon.blender import authoring, light_colors
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.light_meshes import chosen_light_meshes
 from ..vlm_addon.core.errors import VlmError
 

@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender.licences import licences
+from ..vlm_addon.blender.support.licences import licences
 
 POPUP_WIDTH = 480
 

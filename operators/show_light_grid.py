@@ -3,8 +3,10 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, grid_view
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.long_operator import LongOperator
+from ..vlm_addon.blender.overlays import grid_view
 
 
 class VLM_OT_show_light_grid(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)

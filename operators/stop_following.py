@@ -3,7 +3,8 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import animation, authoring
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.following import animation
 from ..vlm_addon.core.errors import VlmError
 
 

@@ -3,8 +3,10 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, tag_pairing
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.interface import availability
 from ..vlm_addon.blender.long_operator import LongOperator
+from ..vlm_addon.blender.tagging import tag_pairing
 
 
 class VLM_OT_tag_thin(LongOperator, Operator):  # noqa: N801 (Blender's naming of classes)

@@ -4,7 +4,9 @@
 import bpy
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring, availability, links
+from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender.interface import availability
+from ..vlm_addon.blender.tagging import links
 from ..vlm_addon.core.errors import VlmError
 
 

@@ -111,7 +111,7 @@ def cube_lights(make_cube):
     # only tests that ask for it import the package: those of the installed extension must not
     from vlm_addon.bake import BakeSettings
     from vlm_addon.blender import authoring
-    from vlm_addon.blender.properties import ensure_scene_settings
+    from vlm_addon.blender.interface.properties import ensure_scene_settings
     from vlm_addon.core.progress import silent
 
     ensure_scene_settings()

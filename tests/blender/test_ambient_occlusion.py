@@ -9,7 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 from tests.render.open_pictures import by_rays, look, mean_error  # noqa: E402
-from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.blender.extraction.extract import extract_scene  # noqa: E402
 from vlm_addon.render.device import Device  # noqa: E402
 
 MONKEY_BOX = Path(__file__).resolve().parents[2] / "sample_blends" / "monkey_box.blend"

@@ -8,9 +8,10 @@ import bpy
 import pytest
 
 from vlm_addon.bake import BakeSettings
-from vlm_addon.blender import authoring, bake_grid, bake_state, bake_store
-from vlm_addon.blender.light_mesh_io import extract
-from vlm_addon.blender.properties import register_scene_settings
+from vlm_addon.blender import authoring
+from vlm_addon.blender.baking import bake_grid, bake_state, bake_store
+from vlm_addon.blender.extraction.light_mesh_io import extract
+from vlm_addon.blender.interface.properties import register_scene_settings
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_grid_file import load_light_grid
 from vlm_addon.core.progress import silent

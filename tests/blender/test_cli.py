@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 import pytest
 
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.image_io import read_image
 from vlm_addon.blender.light_grid_options import scene_grid_settings
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.cli import main
 from vlm_addon.core.light_grid_file import load_light_grid

@@ -6,7 +6,7 @@ import json
 import bpy
 import pytest
 
-from vlm_addon.blender.properties import effect_values, ensure_scene_settings
+from vlm_addon.blender.interface.properties import effect_values, ensure_scene_settings
 from vlm_addon.cli import main
 from vlm_addon.core.effect_rules import RULES
 from vlm_addon.render.frame_effects import SETTINGS

@@ -5,10 +5,10 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.color_space import convert, rec709_to_working, srgb_to_linear, working_to_rec709
 from vlm_addon.blender.cycles_reference import render_reference
+from vlm_addon.blender.extraction.color_space import convert, rec709_to_working, srgb_to_linear, working_to_rec709
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.image_io import write_image
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.write_back import write_light_mesh
 
 HAS_WORKING_SPACES = hasattr(bpy.data, "colorspace")

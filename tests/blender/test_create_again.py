@@ -7,9 +7,9 @@ import pytest
 
 from vlm_addon.bake import BakeSettings
 from vlm_addon.blender import authoring, create_again
+from vlm_addon.blender.extraction.light_mesh_io import extract
+from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import read_faces, write_faces
-from vlm_addon.blender.light_mesh_io import extract
-from vlm_addon.blender.properties import ensure_scene_settings
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.progress import silent
 from vlm_addon.core.tag_pairs import FIRST_AUTOMATIC

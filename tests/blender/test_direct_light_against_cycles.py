@@ -9,7 +9,7 @@ import pytest
 from mathutils import Vector
 
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.render.device import Device
 from vlm_addon.render.frame_types import RenderSettings
 

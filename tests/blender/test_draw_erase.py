@@ -5,14 +5,14 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.draw_erase import cut, erase
-from vlm_addon.blender.draw_fill import fill
-from vlm_addon.blender.draw_lights import draw
-from vlm_addon.blender.draw_points import repeated
-from vlm_addon.blender.draw_shapes import rectangle
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.drawing.draw_erase import cut, erase
+from vlm_addon.blender.drawing.draw_fill import fill
+from vlm_addon.blender.drawing.draw_lights import draw
+from vlm_addon.blender.drawing.draw_points import repeated
+from vlm_addon.blender.drawing.draw_shapes import rectangle
+from vlm_addon.blender.extraction.extract import extract_scene
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import face_count, read_faces, select_faces, write_faces
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import empty_light_mesh

@@ -8,12 +8,12 @@ import pytest
 from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
-from vlm_addon.blender import draw_lights
-from vlm_addon.blender.draw_points import repeated
-from vlm_addon.blender.draw_shapes import rectangle
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.drawing import draw_lights
+from vlm_addon.blender.drawing.draw_points import repeated
+from vlm_addon.blender.drawing.draw_shapes import rectangle
+from vlm_addon.blender.extraction.extract import extract_scene
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import read_faces
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.core.errors import InvalidInput
 
 UP = np.array([[0.0, 0.0, 1.0]])

@@ -9,10 +9,10 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
-from vlm_addon.blender.draw_points import directions_of, rows_of, stroke, text_of
-from vlm_addon.blender.draw_shapes import rectangle, simplified, strip, way_in_steps
-from vlm_addon.blender.draw_view import View
-from vlm_addon.blender.drawn_faces import faces_of, plane_of, triangles_of
+from vlm_addon.blender.drawing.draw_points import directions_of, rows_of, stroke, text_of
+from vlm_addon.blender.drawing.draw_shapes import rectangle, simplified, strip, way_in_steps
+from vlm_addon.blender.drawing.draw_view import View
+from vlm_addon.blender.drawing.drawn_faces import faces_of, plane_of, triangles_of
 from vlm_addon.core.errors import InvalidInput
 
 SIZE = (320, 200)

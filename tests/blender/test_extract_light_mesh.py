@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.extract import ExtractOptions
-from vlm_addon.blender.light_mesh_io import extract, extract_light_mesh
+from vlm_addon.blender.extraction.extract import ExtractOptions
+from vlm_addon.blender.extraction.light_mesh_io import extract, extract_light_mesh
 from vlm_addon.core.errors import InvalidInput
 
 
@@ -193,7 +193,7 @@ def test_missing_colours_are_white_and_listed(make_plane, make_lights):
 
 
 def test_both_ways_of_reading_agree(make_plane, make_lights):
-    from vlm_addon.blender.extract import extract_scene
+    from vlm_addon.blender.extraction.extract import extract_scene
     from vlm_addon.core.array_codec import content_hash
 
     make_plane()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extract import extract_scene, require_camera, require_lights, require_surfaces
+from vlm_addon.blender.extraction.extract import extract_scene, require_camera, require_lights, require_surfaces
 from vlm_addon.core.errors import InvalidInput
 
 HAS_EXPOSURE = "exposure" in bpy.types.Light.bl_rna.properties

@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.extract import extract_scene
-from vlm_addon.blender.triangle_averages import BARYCENTRICS, TextureAverager
+from vlm_addon.blender.extraction.extract import extract_scene
+from vlm_addon.blender.extraction.triangle_averages import BARYCENTRICS, TextureAverager
 from vlm_addon.core.brdf import diffuse_reflectance
 from vlm_addon.core.scene import NO_TEXTURE, Texture
 

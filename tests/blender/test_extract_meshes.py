@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.extract import ExtractOptions, extract_scene
+from vlm_addon.blender.extraction.extract import ExtractOptions, extract_scene
 from vlm_addon.core.errors import InvalidInput
 
 

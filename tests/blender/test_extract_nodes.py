@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.scene import NO_TEXTURE
 
 SIZE = 8

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from vlm_addon.bake import BakeSettings
-from vlm_addon.blender import animation, authoring
-from vlm_addon.blender.follow_source import RIG, SURFACE, follow_sources, stop_following
-from vlm_addon.blender.light_mesh_io import extract
-from vlm_addon.blender.properties import ensure_scene_settings
-from vlm_addon.blender.surface_transfer import evaluated_surface
+from vlm_addon.blender import authoring
+from vlm_addon.blender.extraction.light_mesh_io import extract
+from vlm_addon.blender.following import animation
+from vlm_addon.blender.following.follow_source import RIG, SURFACE, follow_sources, stop_following
+from vlm_addon.blender.following.surface_transfer import evaluated_surface
+from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
@@ -485,7 +486,7 @@ def test_a_new_light_mesh_of_the_dancer_dances_as_close_to_her_as_it_was_made(sa
 
     def apart(name):
         surface = evaluated_surface([bpy.data.objects[name]], context.evaluated_depsgraph_get())
-        from vlm_addon.blender.surface_transfer import nearest
+        from vlm_addon.blender.following.surface_transfer import nearest
 
         return nearest(surface, place(followers[name]), np.zeros((len(followers[name].data.vertices), 3))).distances
 

@@ -28,9 +28,9 @@ bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 from numpy.lib.stride_tricks import sliding_window_view  # noqa: E402
 
-from vlm_addon.blender.lamps import read_camera  # noqa: E402
-from vlm_addon.blender.light_mesh_io import extract  # noqa: E402
-from vlm_addon.blender.materials import FindingList  # noqa: E402
+from vlm_addon.blender.extraction.lamps import read_camera  # noqa: E402
+from vlm_addon.blender.extraction.light_mesh_io import extract  # noqa: E402
+from vlm_addon.blender.extraction.materials import FindingList  # noqa: E402
 from vlm_addon.core.form_factor import polygon_form_factor  # noqa: E402
 from vlm_addon.core.scene import SUN  # noqa: E402
 from vlm_addon.render.device import Device  # noqa: E402

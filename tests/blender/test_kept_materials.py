@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender import kept_materials
-from vlm_addon.blender.draw_lights import draw
+from vlm_addon.blender.drawing.draw_lights import draw
+from vlm_addon.blender.extraction import kept_materials
 from vlm_addon.blender.light_faces import read_faces
 
 SQUARE = 0.1 * np.array([(-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)])

@@ -8,7 +8,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
-from vlm_addon.blender.light_mesh_io import extract  # noqa: E402
+from vlm_addon.blender.extraction.light_mesh_io import extract  # noqa: E402
 from vlm_addon.core.array_codec import content_hash  # noqa: E402
 from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid  # noqa: E402
 from vlm_addon.core.light_grid_error import grid_error  # noqa: E402

@@ -9,7 +9,7 @@ from mathutils import Vector
 from tests.render.glossy_pixels import GlossyPixels, reflection
 from tests.render.rooms import lights_from_triangles
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.brdf import lookup_albedo
 from vlm_addon.render.device import Device
 

@@ -7,11 +7,11 @@ import pytest
 
 from vlm_addon.bake import BakeSettings
 from vlm_addon.blender import authoring, checking
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.findings import fixable_kinds, marked_faces, select_offenders
+from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import read_faces, write_faces
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.light_repair import kinds_to_fix, work_on, write_fixed
-from vlm_addon.blender.properties import ensure_scene_settings
 from vlm_addon.core import finding_kinds as kinds
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out

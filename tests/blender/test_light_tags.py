@@ -5,14 +5,14 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender import light_tags, tag_pairing
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import read_faces, select_faces, write_faces
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.light_meshes import new_tags
-from vlm_addon.blender.light_tags import assign_tag, clear_tag, tag_problem, unused_tag
-from vlm_addon.blender.source_faces import NO_FACE, read_source_faces
-from vlm_addon.blender.stored_links import read_links, write_links
 from vlm_addon.blender.tag_separation import separate
+from vlm_addon.blender.tagging import light_tags, tag_pairing
+from vlm_addon.blender.tagging.light_tags import assign_tag, clear_tag, tag_problem, unused_tag
+from vlm_addon.blender.tagging.source_faces import NO_FACE, read_source_faces
+from vlm_addon.blender.tagging.stored_links import read_links, write_links
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out
 from vlm_addon.core.progress import silent

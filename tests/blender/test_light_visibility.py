@@ -16,7 +16,7 @@ from tests.render.closed_rooms import inward_box  # noqa: E402
 from tests.render.rooms import camera_at  # noqa: E402
 from vlm_addon.bake import BakeSettings, bake  # noqa: E402
 from vlm_addon.blender.cycles_reference import render_reference  # noqa: E402
-from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.blender.extraction.extract import extract_scene  # noqa: E402
 from vlm_addon.core.light_mesh import join  # noqa: E402
 from vlm_addon.core.metrics import relative_rmse  # noqa: E402
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh, subdivide_light_mesh  # noqa: E402

@@ -5,10 +5,10 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender import links
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import select_faces
-from vlm_addon.blender.light_mesh_io import extract
-from vlm_addon.blender.stored_links import read_links
+from vlm_addon.blender.tagging import links
+from vlm_addon.blender.tagging.stored_links import read_links
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out

@@ -11,7 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 from vlm_addon.blender.cycles_reference import render_reference  # noqa: E402
-from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.blender.extraction.extract import extract_scene  # noqa: E402
 from vlm_addon.core.metrics import flip, relative_rmse  # noqa: E402
 from vlm_addon.core.surface_points import random_surface_points  # noqa: E402
 from vlm_addon.render.device import Device  # noqa: E402

@@ -19,7 +19,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
-from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.blender.extraction.extract import extract_scene  # noqa: E402
 from vlm_addon.render.device import Device  # noqa: E402
 from vlm_addon.render.frame_types import RenderSettings  # noqa: E402
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender import migration
+from vlm_addon.blender.extraction.light_mesh_io import extract
+from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import write_faces
-from vlm_addon.blender.light_mesh_io import extract
 from vlm_addon.blender.light_meshes import require_editable, sources
-from vlm_addon.blender.properties import ensure_scene_settings
 from vlm_addon.core.errors import InvalidInput
 
 FIRST, PRESENT, LATER = 1, 2, 3

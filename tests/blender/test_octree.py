@@ -12,7 +12,7 @@ from mathutils.bvhtree import BVHTree  # noqa: E402
 
 from tests.render.octree_rays import ask_exact, build, build_exact, clear_on_device  # noqa: E402
 from tests.voxel_scenes import surface_points, torus  # noqa: E402
-from vlm_addon.blender.extract import extract_scene  # noqa: E402
+from vlm_addon.blender.extraction.extract import extract_scene  # noqa: E402
 from vlm_addon.core.brick_triangles import ALL_EXACT, LIFT_SHARE, build_exact_octree  # noqa: E402
 from vlm_addon.core.voxel_frame import make_voxel_frame  # noqa: E402
 from vlm_addon.core.voxel_octree import codes_of, voxel_codes  # noqa: E402

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender import overlays
-from vlm_addon.blender.overlay_drawing import OverlayDrawing
-from vlm_addon.blender.overlay_shapes import (
+from vlm_addon.blender.overlays import overlays
+from vlm_addon.blender.overlays.overlay_drawing import OverlayDrawing
+from vlm_addon.blender.overlays.overlay_shapes import (
     COLOR,
     EMISSION,
     TAGS,

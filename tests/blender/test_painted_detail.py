@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vlm_addon.bake import BakeSettings, bake
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
+from vlm_addon.blender.extraction.painted_detail import MOST_DETAIL
 from vlm_addon.blender.names import MORE_DETAIL_GROUP, NO_LIGHTS_GROUP
-from vlm_addon.blender.painted_detail import MOST_DETAIL
 
 
 @pytest.fixture

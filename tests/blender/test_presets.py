@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from vlm_addon.blender import setting_presets
-from vlm_addon.blender.properties import ensure_scene_settings, technique_settings
+from vlm_addon.blender.interface import setting_presets
+from vlm_addon.blender.interface.properties import ensure_scene_settings, technique_settings
 from vlm_addon.core.settings import from_mapping
 from vlm_addon.render.technique import technique_by_name, technique_list
 

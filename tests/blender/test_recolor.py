@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender import recolor
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.blender.light_colors import BOTH, COLOR
 from vlm_addon.blender.light_faces import read_faces
 from vlm_addon.blender.recolor import OBJECT, POINT, Place

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.render.gathering import gathered
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.surface_points import random_surface_points
 from vlm_addon.render.device import Device
 

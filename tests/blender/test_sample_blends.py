@@ -13,8 +13,8 @@ bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 import mathutils  # noqa: E402
 
-from vlm_addon.blender.extract import extract_scene  # noqa: E402
-from vlm_addon.blender.light_mesh_io import extract  # noqa: E402
+from vlm_addon.blender.extraction.extract import extract_scene  # noqa: E402
+from vlm_addon.blender.extraction.light_mesh_io import extract  # noqa: E402
 from vlm_addon.core.array_codec import content_hash  # noqa: E402
 from vlm_addon.core.scene import DIFFUSE  # noqa: E402
 

@@ -8,7 +8,7 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
 from tests.render.mirror_rays import reflected
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.core.exr import image_of, read_exr
 from vlm_addon.render.device import Device
 from vlm_addon.render.passes.screen_reflection import ReflectionSettings

@@ -11,8 +11,10 @@ from pathlib import Path
 import bpy
 import pytest
 
-from vlm_addon.blender import bake_state, diagnostics, documentation, licences, render_log, render_process
-from vlm_addon.blender.properties import register_scene_settings
+from vlm_addon.blender import render_process
+from vlm_addon.blender.baking import bake_state
+from vlm_addon.blender.interface.properties import register_scene_settings
+from vlm_addon.blender.support import diagnostics, documentation, licences, render_log
 from vlm_addon.core.errors import DeviceError
 from vlm_addon.core.scene import SceneSnapshot
 from vlm_addon.render.frame_types import RenderSettings

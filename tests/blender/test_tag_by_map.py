@@ -7,10 +7,10 @@ import pytest
 
 from vlm_addon.bake import BakeSettings
 from vlm_addon.blender import authoring
-from vlm_addon.blender.extract import extract_scene
+from vlm_addon.blender.extraction.extract import extract_scene
+from vlm_addon.blender.extraction.light_mesh_io import extract
+from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import read_faces
-from vlm_addon.blender.light_mesh_io import extract
-from vlm_addon.blender.properties import ensure_scene_settings
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out
 from vlm_addon.core.progress import silent

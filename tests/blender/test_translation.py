@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from vlm_addon.blender import german, panels, render_panels, translation
-from vlm_addon.blender.properties import ensure_scene_settings
+from vlm_addon.blender.interface import german, panels, render_panels, translation
+from vlm_addon.blender.interface.properties import ensure_scene_settings
 
 OPERATORS = Path(__file__).resolve().parents[2] / "operators"
 

@@ -6,8 +6,8 @@ import json
 import bpy
 import pytest
 
-from vlm_addon.blender.light_mesh_io import extract
-from vlm_addon.blender.properties import technique_settings
+from vlm_addon.blender.extraction.light_mesh_io import extract
+from vlm_addon.blender.interface.properties import technique_settings
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.cli import main
 from vlm_addon.core.light_grid_file import load_baked_visibility

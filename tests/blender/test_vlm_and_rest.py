@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("bpy", reason="bpy is not installed in this Python")
 
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.cli import main
 from vlm_addon.core.metrics import relative_rmse

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import bpy
 
-from vlm_addon.blender.draw_keys import KEY_OPERATOR
-from vlm_addon.blender.workflow import ELSEWHERE, PIE, STEPS, button
+from vlm_addon.blender.drawing.draw_keys import KEY_OPERATOR
+from vlm_addon.blender.interface.workflow import ELSEWHERE, PIE, STEPS, button
 
 OPERATORS = Path(__file__).resolve().parents[2] / "operators"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extract import extract_scene, require_lights
+from vlm_addon.blender.extraction.extract import extract_scene, require_lights
 from vlm_addon.core.environment import map_directions, map_solid_angles
 from vlm_addon.core.settings import from_mapping
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.light_mesh_io import extract
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh, empty_light_mesh

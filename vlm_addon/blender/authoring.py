@@ -17,17 +17,17 @@ from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
 from ..core.tag_pairs import without_automatic
-from . import animation
-from .availability import has_geometry, light_mesh_objects, rendered_objects
-from .bake_state import set_made_from
+from .baking.bake_state import set_made_from
 from .engine import ENGINE_ID
-from .extract import ExtractOptions, extract_scene, require_camera, require_lights
+from .extraction.extract import ExtractOptions, extract_scene, require_camera, require_lights
+from .extraction.light_mesh_io import Extraction, LightOrigins, extract, origins_of
 from .findings import list_findings
+from .following import animation
+from .interface.availability import has_geometry, light_mesh_objects, rendered_objects
 from .light_faces import write_faces
-from .light_mesh_io import Extraction, LightOrigins, extract, origins_of
 from .names import LOCK_ATTRIBUTE, NAME, SOURCES_PROPERTY
-from .source_faces import SourceFaces, read_source_faces
-from .source_tags import faces_to_tag, require_unchanged, write_face_tags
+from .tagging.source_faces import SourceFaces, read_source_faces
+from .tagging.source_tags import faces_to_tag, require_unchanged, write_face_tags
 from .write_back import write_light_mesh
 
 TAG_REGIONS = {

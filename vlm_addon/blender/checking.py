@@ -10,11 +10,11 @@ from typing import Any
 from ..core.progress import Progress
 from ..core.scene import Finding
 from ..light_grid_bake import check_lights
-from . import animation
 from .authoring import lights, require_scene
+from .extraction.light_mesh_io import Extraction, LightOrigins, extract
 from .findings import list_findings
+from .following import animation
 from .light_grid_options import scene_grid_settings
-from .light_mesh_io import Extraction, LightOrigins, extract
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from typing import Any
 from ..core.errors import InvalidInput
 from ..core.scene import Finding
 from ..core.whole_file import atomic_output
-from .extract import ExtractOptions
-from .light_mesh_io import Extraction, extract
-from .properties import ensure_scene_settings
+from .extraction.extract import ExtractOptions
+from .extraction.light_mesh_io import Extraction, extract
+from .interface.properties import ensure_scene_settings
 from .scene_file import OpenedScene, open_scene, require_writable
 
 

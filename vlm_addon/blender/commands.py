@@ -18,16 +18,16 @@ from ..core.scene import Finding, SceneSnapshot
 from ..core.settings import from_mapping
 from ..light_grid_bake import GridBake, bake_light_grid, check_lights
 from ..terminal import TerminalProgress
-from .availability import light_mesh_objects
-from .bake_state import set_made_from
+from .baking.bake_state import set_made_from
+from .baking.visibility_bake import bake_visibility, require_room_for_visibility
 from .checking import over_budget
 from .command_support import opened_scene, print_findings, require_apart, scene_report, write_json
-from .extract import ExtractOptions
+from .extraction.extract import ExtractOptions
+from .extraction.light_mesh_io import Extraction, extract_light_mesh
+from .interface.availability import light_mesh_objects
 from .light_grid_options import keep_options, scene_grid_settings
-from .light_mesh_io import Extraction, extract_light_mesh
 from .names import NAME, SOURCES_PROPERTY
 from .scene_file import save_blend
-from .visibility_bake import bake_visibility, require_room_for_visibility
 from .write_back import write_light_mesh
 
 

@@ -15,9 +15,9 @@ from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.tag_pairs import FIRST_AUTOMATIC
 from .authoring import Made, from_objects
-from .color_space import convert, working_to_rec709
+from .extraction.color_space import convert, working_to_rec709
+from .extraction.light_mesh_io import extract
 from .light_faces import read_faces
-from .light_mesh_io import extract
 from .light_meshes import require_editable, source_names, sources, tags_of
 from .names import AREA_SCALE_ATTRIBUTE, COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, is_light_mesh
 

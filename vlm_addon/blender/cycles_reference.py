@@ -16,9 +16,9 @@ import numpy as np
 from ..core.errors import InvalidInput, VlmError
 from ..core.exr import image_of, read_exr
 from ..core.scene import Float32
-from .color_space import convert, working_to_rec709
-from .evaluation import light_meshes_in_render, no_render_handlers, only_layer
-from .temporary import present, restored
+from .extraction.color_space import convert, working_to_rec709
+from .extraction.evaluation import light_meshes_in_render, no_render_handlers, only_layer
+from .extraction.temporary import present, restored
 
 CONVERGED_BOUNCES = 32
 MINIMAL_SAMPLES = 2

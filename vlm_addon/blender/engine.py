@@ -11,10 +11,10 @@ from ..core.errors import Cancelled, VlmError
 from ..core.scene import Finding
 from ..render.frame_types import Frame, RenderSettings
 from ..render.technique import technique_by_name
-from .availability import rendering_problem
-from .color_space import convert, rec709_to_working
-from .light_mesh_io import extract
-from .properties import effect_values, technique_settings
+from .extraction.color_space import convert, rec709_to_working
+from .extraction.light_mesh_io import extract
+from .interface.availability import rendering_problem
+from .interface.properties import effect_values, technique_settings
 from .render_process import KEPT
 
 ENGINE_ID = "VLM_ENGINE"

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..core.errors import VlmError
 from .authoring import allow, lights
-from .availability import light_faces_problem
+from .interface.availability import light_faces_problem
 from .light_colors import one_per_mesh
 from .light_faces import Bool, chosen_faces
 from .light_meshes import chosen_light_meshes, require_editable

@@ -15,8 +15,8 @@ from ..core.errors import InvalidInput
 from ..core.repair import can_fix
 from ..core.scene import Finding
 from ..core.spans import numbers_in, parse_spans, spans_text
+from .extraction.light_mesh_io import LightOrigins
 from .light_faces import face_count, select_faces
-from .light_mesh_io import LightOrigins
 from .light_meshes import light_meshes
 
 Int64 = npt.NDArray[np.int64]

@@ -16,8 +16,8 @@ from ..core.errors import InvalidInput, VlmError
 from ..core.exr import image_of, read_exr, write_exr
 from ..core.scene import Float32
 from ..core.whole_file import atomic_output
-from .color_space import convert, rec709_to_working
-from .temporary import present, restored
+from .extraction.color_space import convert, rec709_to_working
+from .extraction.temporary import present, restored
 
 EXR, PNG = ".exr", ".png"
 LOCAL_VIEW = "local"

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import InvalidInput
-from .mesh_arrays import ATTRIBUTE_COMPONENTS, ATTRIBUTE_FIELDS, read
+from .extraction.mesh_arrays import ATTRIBUTE_COMPONENTS, ATTRIBUTE_FIELDS, read
 from .names import AREA_SCALE_ATTRIBUTE, COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, TAG_ATTRIBUTE
 
 Bool = npt.NDArray[np.bool_]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.mesh_topology import Bool, Rows, rows_by_key
 from ..core.scene import Float64, Int32
-from .mesh_arrays import flipped, read
+from .extraction.mesh_arrays import flipped, read
 
 
 @dataclass(frozen=True)

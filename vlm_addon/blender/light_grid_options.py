@@ -12,7 +12,7 @@ from ..core.light_grid import RANGE, TOLERANCE, GridSettings
 from ..core.settings import from_mapping
 from ..render.technique import technique_by_name
 from ..render.techniques.vlm import BAKED
-from .properties import technique_group, technique_settings
+from .interface.properties import technique_group, technique_settings
 
 TECHNIQUE = "vlm"
 VISIBILITY = "visibility"

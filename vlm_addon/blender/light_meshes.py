@@ -31,7 +31,7 @@ from .names import (
     TAG_PROPERTY,
     is_light_mesh,
 )
-from .stored_links import read_links
+from .tagging.stored_links import read_links
 
 NO_ID = 0
 LARGEST_ID = 2**31 - 1

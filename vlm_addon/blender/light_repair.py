@@ -26,9 +26,9 @@ from ..core.scene import Float64
 from ..core.validate import check_light_mesh
 from .authoring import lights
 from .checking import extract_edited
+from .extraction.light_mesh_io import LightOrigins
 from .findings import TAGGED, fixable, fixable_kinds
 from .light_faces import face_count, read_faces, write_faces
-from .light_mesh_io import LightOrigins
 from .light_meshes import is_local, light_meshes
 from .names import (
     AREA_SCALE_ATTRIBUTE,
@@ -38,7 +38,7 @@ from .names import (
     STRENGTH_PROPERTY,
     TAG_ATTRIBUTE,
 )
-from .tag_pairing import Retagged, pair_lights, paired_text, read_tagging, write_retagged
+from .tagging.tag_pairing import Retagged, pair_lights, paired_text, read_tagging, write_retagged
 
 
 @dataclass(frozen=True)

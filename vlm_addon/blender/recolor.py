@@ -14,8 +14,8 @@ from ..core.mesh_topology import Bool
 from ..core.progress import Progress
 from ..core.scene import Float64
 from .authoring import lights
-from .color_space import convert, rec709_to_working
-from .extract import ExtractOptions, extract_scene
+from .extraction.color_space import convert, rec709_to_working
+from .extraction.extract import ExtractOptions, extract_scene
 from .light_colors import ATTRIBUTES, FaceValues, chosen_areas, new_values, one_per_mesh, write_planned
 from .light_faces import chosen_faces, face_count, read_faces
 from .light_geometry import LightFaces, light_faces_in_world

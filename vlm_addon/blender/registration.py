@@ -8,22 +8,11 @@ from contextlib import ExitStack
 
 import bpy
 
-from . import (
-    authoring,
-    bake_state,
-    cli_commands,
-    draw_tool,
-    engine,
-    engine_panels,
-    menus,
-    migration,
-    overlays,
-    panels,
-    properties,
-    render_panels,
-    setting_presets,
-    translation,
-)
+from . import authoring, cli_commands, engine, migration
+from .baking import bake_state
+from .drawing import draw_tool
+from .interface import engine_panels, menus, panels, properties, render_panels, setting_presets, translation
+from .overlays import overlays
 from .render_process import KEPT
 
 PARTS = (migration, bake_state, draw_tool, setting_presets, menus, translation, overlays)

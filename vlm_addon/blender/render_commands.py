@@ -21,10 +21,10 @@ from ..render.frame_types import Frame, RenderSettings, require_in_range
 from ..render.technique import technique_by_name, technique_list
 from ..terminal import TerminalProgress, table
 from .command_support import opened_scene, print_findings, require_apart, scene_report, write_json
-from .extract import require_camera, require_lights, require_surfaces
+from .extraction.extract import require_camera, require_lights, require_surfaces
+from .extraction.light_mesh_io import Extraction
 from .image_io import LOCAL_VIEW, PNG, require_format, require_view, write_display, write_image
-from .light_mesh_io import Extraction
-from .properties import effect_values, technique_settings
+from .interface.properties import effect_values, technique_settings
 from .render_process import KEPT
 from .scene_file import require_writable
 

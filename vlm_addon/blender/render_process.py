@@ -18,7 +18,7 @@ from ..core.progress import Progress
 from ..core.scene import SceneSnapshot
 from ..render.client import RenderProcess
 from ..render.frame_types import Frame, RenderSettings
-from . import render_log
+from .support import render_log
 
 T = TypeVar("T")
 

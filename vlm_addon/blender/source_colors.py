@@ -18,9 +18,9 @@ from ..core.mesh_topology import Bool, Int64
 from ..core.progress import Progress, silent, step
 from ..core.sampling import GOLDEN_RATIO, sample_counts, sample_regions
 from ..core.scene import Float32, Float64, SceneSnapshot
+from .extraction.source_points import VisibleSurface
+from .extraction.triangle_averages import TextureAverager, triangle_averages
 from .light_geometry import LightFaces
-from .source_points import VisibleSurface
-from .triangle_averages import TextureAverager, triangle_averages
 
 SAMPLES_PER_LIGHT = 16
 LIGHTS_PER_STEP = 256

@@ -12,10 +12,10 @@ from ..core.progress import Progress
 from ..core.scene import UNTAGGED, Int32
 from ..core.tag_pairs import TagUse, related, unpaired
 from ..core.tags import separated_tags
-from .light_tags import counted
-from .region_pairs import RegionPairs, region_pairs
-from .source_faces import NO_FACE
-from .tag_pairing import Retagged, Tagging, Written
+from .tagging.light_tags import counted
+from .tagging.region_pairs import RegionPairs, region_pairs
+from .tagging.source_faces import NO_FACE
+from .tagging.tag_pairing import Retagged, Tagging, Written
 
 
 def separate(tagging: Tagging, progress: Progress) -> Retagged:

@@ -14,7 +14,7 @@ from ..core.errors import InvalidInput
 from ..core.light_links import make_links, no_links
 from ..core.light_mesh import VirtualLightMesh, require_valid
 from ..core.scene import Float64, Int32
-from .color_space import convert, rec709_to_working
+from .extraction.color_space import convert, rec709_to_working
 from .light_factors import set_neutral_factors
 from .light_meshes import set_sources
 from .names import (
@@ -28,7 +28,7 @@ from .names import (
     TAG_ATTRIBUTE,
     is_light_mesh,
 )
-from .stored_links import read_links, write_links
+from .tagging.stored_links import read_links, write_links
 
 
 def write_light_mesh(light_mesh: VirtualLightMesh, name: str, sources: Sequence[str] = (), scene: Any = None) -> Any:

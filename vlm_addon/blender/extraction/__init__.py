@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's scene as arrays: meshes, materials, lamps, world, light meshes."""
