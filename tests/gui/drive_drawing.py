@@ -147,7 +147,7 @@ def made(name, before):
 
 def trace():
     """Time the callbacks of strokes, by event: wall clock, and processor time of the thread."""
-    stroke = sys.modules[f"{PACKAGE}.vlm_addon.blender.draw_modal"].ModalStroke
+    stroke = sys.modules[f"{PACKAGE}.vlm_addon.blender.drawing.draw_modal"].ModalStroke
     handled = stroke._handled
 
     def timed(self, context, event):
