@@ -15,6 +15,7 @@ from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import read_faces
 from vlm_addon.core.errors import InvalidInput
+from vlm_addon.core.tag_pairs import FIRST_AUTOMATIC
 
 UP = np.array([[0.0, 0.0, 1.0]])
 SQUARE = np.array([(-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)])
@@ -122,6 +123,11 @@ def test_a_texture_is_averaged_over_what_the_light_covers(make_plane, make_mater
 def test_the_tag_of_a_face_wins_over_that_of_its_object(red_plane):
     red_plane.data.attributes.new("vlm_tag", "INT", "FACE").data[0].value = 12
     assert read_faces(draw(SQUARE), "vlm_tag").tolist() == [12]
+
+
+def test_an_id_that_pairing_gave_a_face_stays_with_the_lights_that_were_paired(red_plane):
+    red_plane.data.attributes.new("vlm_tag", "INT", "FACE").data[0].value = FIRST_AUTOMATIC
+    assert read_faces(draw(SQUARE), "vlm_tag").tolist() == [7]
 
 
 @pytest.mark.parametrize("hollow", [True, False])

@@ -469,6 +469,21 @@ def test_several_sources_that_stand_still_are_refused(make_cube):
         follow_sources(lights, bpy.context)
 
 
+def test_a_light_mesh_without_lights_of_what_moves_is_refused(make_cube, scene):
+    moving, still = make_cube("Moving"), make_cube("Still")
+    moving.location.x = 9.0
+    for frame, height in ((1, 0.0), (11, 2.0)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    surface = evaluated_surface([still], bpy.context.evaluated_depsgraph_get())
+    lights = light_mesh_of(surface.positions, surface.triangles, "VLM", [moving, still])
+    before = state(lights)
+    with pytest.raises(InvalidInput, match="none of its lights stands for 'Moving', which moves"):
+        follow_sources(lights, bpy.context)
+    assert state(lights) == before
+
+
 def test_a_new_light_mesh_of_the_dancer_dances_as_close_to_her_as_it_was_made(sample_folder, scene):
     bpy.ops.wm.open_mainfile(filepath=str(sample_folder / "dancer.blend"))
     ensure_scene_settings()

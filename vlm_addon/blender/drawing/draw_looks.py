@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.scene import UNTAGGED, Float32, Float64
+from ...core.tag_pairs import is_automatic
 from ..extraction.kept_materials import forget_large, material_reader
 from ..extraction.mesh_arrays import LocalMesh, read_attribute
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY
@@ -204,11 +205,15 @@ class _Reader:
 
 
 def _tag(under: _Under) -> int:
-    """Tag of the face where it has one, else of the object."""
+    """Tag that an artist gave the face, else that of the object.
+
+    Ids given by pairing belong to the lights that were paired: a light with one would leave out what they do.
+    """
     attribute = under.surface.mesh.attributes.get(TAG_ATTRIBUTE)
-    if attribute is not None and attribute.domain == "FACE" and attribute.data_type == "INT":
-        return int(attribute.data[under.face].value) or under.object_tag
-    return under.object_tag
+    if attribute is None or attribute.domain != "FACE" or attribute.data_type != "INT":
+        return under.object_tag
+    tag = int(attribute.data[under.face].value)
+    return under.object_tag if tag == UNTAGGED or is_automatic(tag) else tag
 
 
 def _under(surface: _Surface, tag: int, hit: SurfaceHit, piece: Float64) -> _Under | None:

@@ -24,9 +24,9 @@ from ..extraction.mesh_arrays import read
 from ..extraction.temporary import restored
 from ..light_meshes import require_editable, set_sources, sources
 from ..names import DYNAMIC_PROPERTY
-from ..tagging.separate_lights import separate_by_source
 from .follow_rig import PREFIX, add_first, copy_rig, is_following, mark, remove_rig, rig_problem
 from .rest_shape import evaluated_shape, find_rest, set_shape, shape
+from .separate_lights import has_lights_of, separate_by_source
 from .surface_transfer import Surface, evaluated_surface, nearest, to_world, vertex_normals
 
 AUTO, RIG, SURFACE = "AUTO", "RIG", "SURFACE"
@@ -94,6 +94,9 @@ def require_followable(thing: Any, context: Any, chosen: Sequence[Any] = ()) -> 
             raise InvalidInput(f"source {source.name!r}", "its scale is zero", "give it a scale at this frame")
         if thing in _ancestors(source):
             raise InvalidInput(f"source {source.name!r}", f"it follows {thing.name!r} itself", "clear its parent")
+    if len(found) > 1 and not has_lights_of(thing, found, moving, context):
+        problem = f"none of its lights stands for {moving[0].name!r}, which moves"
+        raise InvalidInput(subject, problem, "create it again with more lights, or from that object alone")
 
 
 def stop_following(thing: Any, context: Any) -> bool:

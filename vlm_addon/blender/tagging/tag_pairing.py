@@ -222,10 +222,12 @@ def paired_text(made: Retagged, written: Written) -> str:
     """A sentence with counts."""
     source = made.before.source
     parts = [counted(written.lights, "light"), counted(written.faces, "face"), counted(written.objects, "whole object")]
-    changed = ", ".join(part for part in parts if part) or "Nothing"
-    told = (
-        f"{changed} got tags for {counted(made.pairs, 'pair') or 'no pair'} of light and face; {written.links:+,} links"
-    )
+    changed = ", ".join(part for part in parts if part)
+    if changed or written.links:
+        pairs = counted(made.pairs, "pair") or "no pair"
+        told = f"{changed or 'Nothing'} got tags for {pairs} of light and face; {written.links:+,} links"
+    else:
+        told = "Nothing to tag: no face that needs it is lit by a light that stands for it"
     for names, why in (
         (source.as_wholes, "as a whole, for lack of faces behind its modifiers"),
         (source.read_only, "left out, since it is linked from another file"),

@@ -10,9 +10,9 @@ import bmesh
 import numpy as np
 
 from ..extraction.mesh_arrays import read
-from ..following.surface_transfer import evaluated_surface, nearest, normals_to_world, to_world
 from ..light_meshes import set_sources, source_names
 from ..names import NAME
+from .surface_transfer import evaluated_surface, nearest, normals_to_world, to_world
 
 
 def separate_by_source(thing: Any, found: Sequence[Any], moving: Sequence[Any], context: Any) -> list[tuple[Any, Any]]:
@@ -38,6 +38,12 @@ def separate_by_source(thing: Any, found: Sequence[Any], moving: Sequence[Any], 
         gone = {source.name for _, source in parts}
         set_sources(thing, [name for name in source_names(thing) if name not in gone], context.scene)
     return parts
+
+
+def has_lights_of(thing: Any, found: Sequence[Any], moving: Sequence[Any], context: Any) -> bool:
+    """Whether any light of `thing` stands for one of the `moving` sources among those that are `found`."""
+    wanted = [found.index(source) for source in moving]
+    return bool(np.isin(_owners(thing, found, context), wanted).any())
 
 
 def _owners(thing: Any, found: Sequence[Any], context: Any) -> np.ndarray:
