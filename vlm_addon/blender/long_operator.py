@@ -29,6 +29,7 @@ class LongOperator(Generic[T]):
     report: Callable[[set[str], str], None]
     _work: BackgroundWork[T]
     _timer: Any
+    _steps_done: int
 
     def prepare(self, context: bpy.types.Context) -> Callable[[Progress], T]:
         """The work, with all that it needs. Raises VlmError."""
@@ -50,10 +51,12 @@ class LongOperator(Generic[T]):
             window_manager.progress_update(round(fraction * PROGRESS_STEPS))
             return True
 
+        self._steps_done = 0
         try:
             work: Callable[[Progress], T] | None = self.prepare(context)
             while work is not None:
                 work = self.finish(context, work(progress))
+                self._steps_done += 1
         except VlmError as error:
             return self._failed(error)
         finally:
@@ -64,6 +67,7 @@ class LongOperator(Generic[T]):
         """Start the work in a thread and look after it from a timer."""
         if bpy.app.background:
             return self.execute(context)
+        self._steps_done = 0
         try:
             self._work = BackgroundWork(self.prepare(context))
         except VlmError as error:
@@ -87,6 +91,7 @@ class LongOperator(Generic[T]):
         except VlmError as error:
             self._clean_up(context)
             return self._failed(error)
+        self._steps_done += 1
         if more is not None:
             self._work = BackgroundWork(more)
             return {"RUNNING_MODAL"}
@@ -110,6 +115,7 @@ class LongOperator(Generic[T]):
             context.workspace.status_text_set(None)
 
     def _failed(self, error: VlmError) -> set[str]:
-        level = "WARNING" if isinstance(error, Cancelled) else "ERROR"
+        # what earlier steps wrote stays and needs its undo step; an error would raise in scripts
+        level = "WARNING" if isinstance(error, Cancelled) or self._steps_done else "ERROR"
         self.report({level}, str(error))
-        return {"CANCELLED"}
+        return {"FINISHED"} if self._steps_done else {"CANCELLED"}
