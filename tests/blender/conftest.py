@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes for tests of the Blender bridge. Every test starts from a file without objects."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -121,6 +122,19 @@ def cube_lights(make_cube):
     thing = bpy.data.objects["VLM"]
     bpy.context.view_layer.objects.active = thing
     return thing
+
+
+@pytest.fixture
+def watched_bakes(_empty_file):
+    """Scene settings and the handlers that say whether what is baked may be out of date."""
+    from vlm_addon.blender.baking import bake_state
+    from vlm_addon.blender.interface.properties import register_scene_settings
+
+    with ExitStack() as undo:
+        if not hasattr(bpy.types.Scene, "vlm"):
+            register_scene_settings(undo)
+        bake_state.register(undo)
+        yield
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where baked data lives, when it is out of date, and that nothing an artist does during a bake does harm."""
 
-from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
@@ -11,7 +10,6 @@ from vlm_addon.bake import BakeSettings
 from vlm_addon.blender import authoring
 from vlm_addon.blender.baking import bake_grid, bake_state, bake_store
 from vlm_addon.blender.extraction.light_mesh_io import extract
-from vlm_addon.blender.interface.properties import register_scene_settings
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_grid_file import load_light_grid
 from vlm_addon.core.progress import silent
@@ -19,13 +17,7 @@ from vlm_addon.core.progress import silent
 FEW = BakeSettings(target_triangles=20)
 
 
-@pytest.fixture(autouse=True)
-def _registered(_empty_file):
-    with ExitStack() as undo:
-        if not hasattr(bpy.types.Scene, "vlm"):
-            register_scene_settings(undo)
-        bake_state.register(undo)
-        yield
+pytestmark = pytest.mark.usefixtures("watched_bakes")
 
 
 @pytest.fixture

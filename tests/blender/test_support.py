@@ -5,15 +5,12 @@ import importlib.metadata
 import os
 import sys
 import tomllib
-from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
 import pytest
 
 from vlm_addon.blender import render_process
-from vlm_addon.blender.baking import bake_state
-from vlm_addon.blender.interface.properties import register_scene_settings
 from vlm_addon.blender.support import diagnostics, documentation, licences, render_log
 from vlm_addon.core.errors import DeviceError
 from vlm_addon.core.scene import SceneSnapshot
@@ -22,13 +19,7 @@ from vlm_addon.render.frame_types import RenderSettings
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.fixture(autouse=True)
-def _registered(_empty_file):
-    with ExitStack() as undo:
-        if not hasattr(bpy.types.Scene, "vlm"):
-            register_scene_settings(undo)
-        bake_state.register(undo)
-        yield
+pytestmark = pytest.mark.usefixtures("watched_bakes")
 
 
 @pytest.fixture
