@@ -11,7 +11,7 @@ from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.findings import fixable_kinds, marked_faces, select_offenders
 from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import read_faces, write_faces
-from vlm_addon.blender.light_repair import kinds_to_fix, work_on, write_fixed
+from vlm_addon.blender.light_repair import kinds_to_fix, work_after, work_on, write_fixed
 from vlm_addon.core import finding_kinds as kinds
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_links import leaves_out
@@ -32,8 +32,9 @@ def fix(kind=""):
     for each in kinds_to_fix(bpy.context.scene, kind):
         work = work_on(bpy.context, each)
         while work is not None:
-            sentence, work = write_fixed(bpy.context, work(silent))
-            told.append(sentence)
+            made = work(silent)
+            told.append(write_fixed(bpy.context, made))
+            work = work_after(bpy.context, made)
     return told
 
 

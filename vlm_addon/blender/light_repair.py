@@ -107,24 +107,31 @@ def _tag_work(context: Any, faces: dict[str, Any]) -> Callable[[Progress], Retag
     return lambda progress: pair_lights(tagging, joined, progress)
 
 
-def write_fixed(context: Any, made: Fixed) -> tuple[str, Callable[[Progress], Fixed] | None]:
-    """Write one fix; returns what was done in words, and work that follows from it."""
+def write_fixed(context: Any, made: Fixed) -> str:
+    """Write one fix; returns what was done in words. Raises VlmError before anything is written."""
     if isinstance(made, Retagged):
-        return paired_text(made, write_retagged(context, made)), None
+        return paired_text(made, write_retagged(context, made))
     if made.repair is None:
-        return f"nothing is {made.kind.replace('_', ' ')} any more", None
+        return f"nothing is {made.kind.replace('_', ' ')} any more"
     with _object_mode(context):
         if made.kind in kinds.BROKEN:
-            return f"Mended the values of {lights(_mend_values(context.scene))}", None
+            return f"Mended the values of {lights(_mend_values(context.scene))}"
         left_out = _write_repair(context.scene, made)
-        sentence = made.repair.sentence
-        if left_out:
-            sentence += f"; left out {left_out[0]!r}{f' and {len(left_out) - 1} more' if len(left_out) > 1 else ''}"
-            sentence += ", which modifiers or shape keys deform, or another file holds"
-    if made.repair.tag_ids is None or made.kind == kinds.LOST_TAG:
-        return sentence, None
+    sentence = made.repair.sentence
+    if left_out:
+        sentence += f"; left out {left_out[0]!r}{f' and {len(left_out) - 1} more' if len(left_out) > 1 else ''}"
+        sentence += ", which modifiers or shape keys deform, or another file holds"
+    return sentence
+
+
+def work_after(context: Any, made: Fixed) -> Callable[[Progress], Fixed] | None:
+    """What a written fix leaves to do: tags for lights that could not be moved far enough. Raises VlmError."""
+    if isinstance(made, Retagged) or made.repair is None or made.repair.tag_ids is None:
+        return None
+    if made.kind == kinds.LOST_TAG:
+        return None
     tagged = np.flatnonzero(made.repair.tag_ids != made.light_mesh.tag_ids)
-    return sentence, _tag_work(context, made.origins.faces_by_object(tagged))
+    return _tag_work(context, made.origins.faces_by_object(tagged))
 
 
 @contextmanager

@@ -29,7 +29,7 @@ class LongOperator(Generic[T]):
     report: Callable[[set[str], str], None]
     _work: BackgroundWork[T]
     _timer: Any
-    _steps_done: int
+    _has_written: bool
 
     def prepare(self, context: bpy.types.Context) -> Callable[[Progress], T]:
         """The work, with all that it needs. Raises VlmError."""
@@ -42,6 +42,10 @@ class LongOperator(Generic[T]):
         """
         raise NotImplementedError
 
+    def keep_what_is_written(self) -> None:
+        """Say that a step has written something: what fails from now on leaves an undo step."""
+        self._has_written = True
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """All steps at once."""
         window_manager = context.window_manager
@@ -51,12 +55,12 @@ class LongOperator(Generic[T]):
             window_manager.progress_update(round(fraction * PROGRESS_STEPS))
             return True
 
-        self._steps_done = 0
+        self._has_written = False
         try:
             work: Callable[[Progress], T] | None = self.prepare(context)
             while work is not None:
                 work = self.finish(context, work(progress))
-                self._steps_done += 1
+                self._has_written = True
         except VlmError as error:
             return self._failed(error)
         finally:
@@ -67,7 +71,7 @@ class LongOperator(Generic[T]):
         """Start the work in a thread and look after it from a timer."""
         if bpy.app.background:
             return self.execute(context)
-        self._steps_done = 0
+        self._has_written = False
         try:
             self._work = BackgroundWork(self.prepare(context))
         except VlmError as error:
@@ -91,7 +95,7 @@ class LongOperator(Generic[T]):
         except VlmError as error:
             self._clean_up(context)
             return self._failed(error)
-        self._steps_done += 1
+        self._has_written = True
         if more is not None:
             self._work = BackgroundWork(more)
             return {"RUNNING_MODAL"}
@@ -116,6 +120,6 @@ class LongOperator(Generic[T]):
 
     def _failed(self, error: VlmError) -> set[str]:
         # what earlier steps wrote stays and needs its undo step; an error would raise in scripts
-        level = "WARNING" if isinstance(error, Cancelled) or self._steps_done else "ERROR"
+        level = "WARNING" if isinstance(error, Cancelled) or self._has_written else "ERROR"
         self.report({level}, str(error))
-        return {"FINISHED"} if self._steps_done else {"CANCELLED"}
+        return {"FINISHED"} if self._has_written else {"CANCELLED"}

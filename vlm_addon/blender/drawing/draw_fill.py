@@ -44,10 +44,13 @@ def fill(context: Any, target: str = "") -> str:
         problem = "no face of the selected meshes is selected"
         raise InvalidInput("selection", problem, "select faces in edit mode (Tab, then 3)")
     made = _joined(parts)
-    if context.mode == "EDIT_MESH":
+    edited = context.mode == "EDIT_MESH"
+    if edited:
         bpy.ops.object.mode_set(mode="OBJECT")
     written, added = write_lights(context, made, thing)
     if not added:
+        if edited:
+            bpy.ops.object.mode_set(mode="EDIT")
         raise InvalidInput("selection", "all of its faces have their light already", "select others")
     thin = (
         f"; {made.in_front} in front of their surface: thin or sharply curved, give both a tag" if made.in_front else ""
