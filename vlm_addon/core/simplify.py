@@ -153,7 +153,13 @@ def create_light_mesh(
     regions = assign_regions(surface, lights, lambda share: step(progress, 0.6 + 0.1 * share, "regions"))
     clock.start(0.7, "place")
     own = _region_rows(regions, ~regions.adopted, len(lights.triangles))
-    placement = place_behind(lights.positions, lights.triangles, own, surface.corners)
+    placement = place_behind(
+        lights.positions,
+        lights.triangles,
+        own,
+        surface.corners,
+        lambda share: step(progress, 0.7 + 0.15 * share, "place"),
+    )
     clock.start(0.85, "withdraw")
     withdrawal = withdraw(
         placement.positions,

@@ -25,7 +25,7 @@ from .triangle_tree import TriangleTree, build_tree
 # Points of each region at which its own light is measured, first of all lights, then of those that may withdraw.
 ROUGH_POINTS, FINE_POINTS = 16, 32
 # Mean share of a light's radiosity that its own region may receive.
-ALLOWED = 3e-3
+ALLOWED = 2e-3
 # Mean own light of all surfaces, of lights of radiosity 1, that the least offenders may leave together.
 NEGLIGIBLE = 3e-5
 # Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
