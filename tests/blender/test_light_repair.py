@@ -171,6 +171,19 @@ def test_a_deformed_light_mesh_is_not_moved_and_said_to_be(cube_lights):
     assert [vertex.co for vertex in cube_lights.data.vertices] == before
 
 
+def test_a_mesh_of_another_file_is_left_alone_and_said_to_be(cube_lights, tmp_path):
+    spoil(cube_lights, "vlm_color", 3, (4.0, 2.0, 1.0, 1.0))
+    library = tmp_path / "library.blend"
+    bpy.data.libraries.write(str(library), {cube_lights.data})
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.meshes = [cube_lights.data.name]
+    cube_lights.data = wanted.meshes[0]
+    assert check() == [kinds.BRIGHT]
+    (told,) = fix(kinds.BRIGHT)
+    assert "left out 'VLM'" in told
+    assert read_faces(cube_lights, "vlm_color")[3, :3].tolist() == [4.0, 2.0, 1.0]
+
+
 def test_offenders_are_selected_in_edit_mode(cube_lights):
     spoil(cube_lights, "vlm_color", 3, 4.0)
     spoil(cube_lights, "vlm_color", 8, 4.0)

@@ -184,7 +184,8 @@ def _write_repair(scene: Any, made: Repaired) -> list[str]:
         if not _touches(made, rows, vertices):
             continue
         moves = made.repair.vertices is not None and not _is_rigid(thing, made.origins.vertex_counts[number])
-        if thing is None or thing.data.name in seen or moves or (made.origins.faces[rows] < 0).any():
+        unknown = (made.origins.faces[rows] < 0).any()
+        if thing is None or not is_local(thing) or thing.data.name in seen or moves or unknown:
             left_out.append(name)
             continue
         seen.add(thing.data.name)
