@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from vlm_addon.blender.cycles_reference import render_reference
-from vlm_addon.blender.extraction.color_space import convert, rec709_to_working, srgb_to_linear, working_to_rec709
+from vlm_addon.blender.extraction.color_space import (
+    convert,
+    into_rec709,
+    rec709_to_working,
+    srgb_to_linear,
+    working_to_rec709,
+)
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.image_io import write_image
 from vlm_addon.blender.write_back import write_light_mesh
@@ -126,3 +132,13 @@ def test_png_shows_the_same_in_every_space(tmp_path, other_space, scene):
 @pytest.mark.parametrize(("encoded", "linear"), [(0.0, 0.0), (0.04045, 0.0031308), (0.5, 0.2140411), (1.0, 1.0)])
 def test_srgb_is_decoded_as_the_standard_says(encoded, linear):
     assert srgb_to_linear(np.float64(encoded)) == pytest.approx(linear, rel=1e-4)
+
+
+def test_what_rec709_cannot_show_is_cut_at_zero_and_what_was_negative_stays():
+    matrix = np.array([[1.66, -0.59, -0.07], [-0.12, 1.13, -0.01], [-0.02, -0.10, 1.12]])
+    colors = np.array([[0.1, 0.8, 0.1], [0.5, 0.5, 0.5], [-0.2, 0.1, 0.1]], np.float32)
+    cut = into_rec709(colors, matrix)
+    assert (cut[:2] >= 0.0).all()
+    assert cut[1] == pytest.approx(convert(colors, matrix)[1])
+    assert cut[2, 0] < 0.0
+    assert into_rec709(colors, np.eye(3)) is colors

@@ -229,7 +229,6 @@ def test_a_render_engine_gets_the_light_meshes_that_renders_hide(make_plane, mak
     ("change", "text"),
     [
         (lambda o: o.__setitem__("vlm_schema", 3), "vlm_schema is 3"),
-        (lambda o: o.data.clear_geometry(), "it has no faces"),
         (lambda o: o.__setitem__("vlm_strength", -1.0), "negative"),
         (lambda o: o.__setitem__("vlm_strength", float("nan")), "not finite"),
     ],
@@ -260,3 +259,12 @@ def test_lights_that_a_modifier_made_lead_back_to_no_face(make_plane, make_light
     found = extract()
     assert len(found.light_mesh) == 4
     assert found.origins.faces_by_object(range(4)) == {}
+
+
+def test_a_light_mesh_without_faces_gives_no_light_and_is_named(make_plane, make_lights):
+    make_plane()
+    make_lights(square_at(-0.1), [(0, 1, 2)], name="kept", vlm_color=np.ones((1, 3)))
+    make_lights(square_at(-0.2), [(0, 1, 2)], name="emptied", vlm_color=np.ones((1, 3))).data.clear_geometry()
+    found = extract()
+    assert len(found.light_mesh) == 1
+    assert "light mesh 'emptied'" in [finding.subject for finding in found.snapshot.findings]

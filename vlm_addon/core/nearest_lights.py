@@ -127,7 +127,9 @@ def _narrowed(lights: _Lights, box: _Boxes, pairs: Rows, parent: Int64) -> Rows:
 
 def _exact(lights: _Lights, middle: Float64, normal: Float64, pairs: Rows, parent: Int64) -> Int64:
     owner, light = pairs.expand(parent)
-    turned = (1.0 - np.einsum("ij,ij->i", normal[owner], lights.normal[light])) * lights.area[light]
+    # Rounding of unit normals may give cosines above 1, and a negative least score would keep no light at all.
+    cosine = np.minimum(np.einsum("ij,ij->i", normal[owner], lights.normal[light]), 1.0)
+    turned = (1.0 - cosine) * lights.area[light]
     gap = np.maximum(lights.low[light] - middle[owner], middle[owner] - lights.high[light])
     least = (np.maximum(gap, 0.0) ** 2).sum(axis=1) + turned
     most = ((middle[owner] - lights.middle[light]) ** 2).sum(axis=1) + turned

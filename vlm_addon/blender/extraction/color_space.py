@@ -31,6 +31,15 @@ def convert(colors: np.ndarray, matrix: Float64) -> np.ndarray:
     return (colors @ matrix.T).astype(colors.dtype)
 
 
+def into_rec709(colors: np.ndarray, matrix: Float64) -> np.ndarray:
+    """`convert`, where a colour without a negative channel has none afterwards: what Rec.709 lacks is cut at 0."""
+    converted = convert(colors, matrix)
+    if converted is colors:
+        return colors
+    sound = (colors >= 0.0).all(axis=-1, keepdims=True)
+    return np.where(sound, np.maximum(converted, 0.0), converted).astype(colors.dtype)
+
+
 def srgb_to_linear(encoded: np.ndarray) -> np.ndarray:
     """Values of IEC 61966-2-1 (sRGB) decoded to linear light, in the dtype given."""
     low = encoded / 12.92

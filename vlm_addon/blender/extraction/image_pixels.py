@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.scene import Float32, Float64
-from .color_space import convert, srgb_to_linear
+from .color_space import into_rec709, srgb_to_linear
 
 # What Cycles shows where an image is missing.
 MISSING_COLOR = (1.0, 0.0, 1.0, 1.0)
@@ -64,7 +64,7 @@ def _four_channels(stored: Float32) -> Float32:
 
 def _float_pixels(pixels: Float32, image: Any, straight: bool, to_rec709: Float64) -> Float32:
     """Blender converts float images to the working space when it loads them, and keeps their alpha premultiplied."""
-    pixels[..., :3] = convert(pixels[..., :3], to_rec709)
+    pixels[..., :3] = into_rec709(pixels[..., :3], to_rec709)
     if _has_no_alpha(image):
         pixels[..., 3] = 1.0
     elif image.alpha_mode != "CHANNEL_PACKED" and straight:

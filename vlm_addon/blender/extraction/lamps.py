@@ -22,7 +22,7 @@ from ...core.scene import (
     Float64,
     Light,
 )
-from .color_space import convert
+from .color_space import into_rec709
 from .materials import FindingList
 from .node_graph import node_label, source
 from .node_values import NodeEvaluator
@@ -107,7 +107,7 @@ def _color(lamp: Any, evaluator: NodeEvaluator, to_rec709: Float64, owner: str) 
     color = np.array(lamp.color, np.float32)
     if getattr(lamp, "use_temperature", False):
         color *= np.array(lamp.temperature_color, np.float32)
-    color = convert(color, to_rec709)
+    color = into_rec709(color, to_rec709)
     if lamp.node_tree is None or not getattr(lamp, "use_nodes", True):
         return color
     output = lamp.node_tree.get_output_node("CYCLES")

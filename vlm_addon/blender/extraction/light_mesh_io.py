@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.errors import InvalidInput
-from ...core.light_mesh import VirtualLightMesh, join, require_valid
+from ...core.light_mesh import VirtualLightMesh, empty_light_mesh, join, require_valid
 from ...core.scene import Float32, Float64, Int32, SceneSnapshot
 from ..names import (
     AREA_SCALE_ATTRIBUTE,
@@ -26,7 +26,7 @@ from ..names import (
     is_light_mesh,
 )
 from ..tagging.stored_links import read_links
-from .color_space import convert, working_to_rec709
+from .color_space import into_rec709, working_to_rec709
 from .dynamics import is_dynamic
 from .evaluation import evaluate
 from .extract import ExtractOptions, extract_from
@@ -198,7 +198,8 @@ def _read_lights(
 ) -> _Read:
     local = read_mesh(mesh, owner)
     if not len(local.triangles):
-        raise InvalidInput(owner, "it has no faces", "add faces or delete it")
+        report(owner, "it has no faces", "it gives no light: draw some, or delete it")
+        return _Read(empty_light_mesh(), blender_object.original.name, np.zeros(0, np.int32))
     count = len(mesh.polygons)
     color = face_attribute(mesh, COLOR_ATTRIBUTE, "FLOAT_COLOR")
     if color is None:
@@ -214,7 +215,7 @@ def _read_lights(
 
     def tinted(values: np.ndarray | None) -> Float32:
         rgb = np.zeros((count, 3), np.float32) if values is None else values[:, :3]
-        return convert(rgb * hue, to_rec709)[local.faces]
+        return into_rec709(rgb * hue, to_rec709)[local.faces]
 
     mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
     lights = len(local.triangles)

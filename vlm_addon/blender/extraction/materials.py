@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.scene import NO_TEXTURE, Finding, Float64, Material, Texture
-from .color_space import convert
+from .color_space import into_rec709
 from .node_graph import node_label, node_tree_of, source
 from .node_values import NodeEvaluator
 from .surface_value import IDENTITY_UV, SurfaceValue, UvSource
@@ -68,7 +68,7 @@ class MaterialTable:
         owner = f"material {material.name!r}"
         tree = node_tree_of(material)
         if tree is None:
-            return diffuse_surface(convert(np.array(material.diffuse_color[:3], np.float32), self._to_rec709))
+            return diffuse_surface(into_rec709(np.array(material.diffuse_color[:3], np.float32), self._to_rec709))
         output = tree.get_output_node("CYCLES")
         if output is None:
             self._report(owner, "it has no output node", "it is black, as in Cycles")

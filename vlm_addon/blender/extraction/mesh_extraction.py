@@ -11,7 +11,7 @@ import numpy as np
 from ...core.errors import InvalidInput
 from ...core.scene import Float32, Float64, Int32, Mesh
 from ..names import TAG_PROPERTY
-from .color_space import convert
+from .color_space import into_rec709
 from .dynamics import is_dynamic
 from .materials import FindingList, MaterialTable, MaterialUse
 from .mesh_arrays import LocalMesh, flipped, place, read_mesh
@@ -173,7 +173,7 @@ class MeshExtractor:
                 self._report(f"object {name!r}", f"it has no colour attribute {use.color_attribute!r}", "it is black")
                 result[chosen] = 0.0
                 continue
-            result[chosen] = convert(colors[chosen], self._to_rec709)
+            result[chosen] = into_rec709(colors[chosen], self._to_rec709)
         return result
 
     def _is_dynamic(self, instance: Any) -> bool:

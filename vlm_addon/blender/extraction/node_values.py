@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.scene import Float32, Float64
 from . import node_operations as operations
-from .color_space import convert
+from .color_space import into_rec709
 from .image_pixels import MISSING_COLOR, image_pixels
 from .node_graph import Endpoint, node_label, source
 from .surface_value import (
@@ -68,7 +68,7 @@ class NodeEvaluator:
 
     def default(self, socket: Any) -> SurfaceValue:
         if socket.type == "RGBA":
-            return constant_color(convert(np.array(socket.default_value[:3], np.float32), self.to_rec709))
+            return constant_color(into_rec709(np.array(socket.default_value[:3], np.float32), self.to_rec709))
         if socket.type in ("VALUE", "INT", "BOOLEAN"):
             return constant_number(float(socket.default_value))
         if socket.type == "VECTOR":
@@ -262,7 +262,7 @@ def _color_ramp(evaluator: NodeEvaluator, endpoint: Endpoint, owner: str, report
     ramp = endpoint.node.color_ramp
     positions = np.linspace(0.0, 1.0, CURVE_SAMPLES)
     table = np.array([ramp.evaluate(position)[:] for position in positions], np.float32)
-    table[:, :3] = convert(table[:, :3], evaluator.to_rec709)
+    table[:, :3] = into_rec709(table[:, :3], evaluator.to_rec709)
     factor = evaluator.number(endpoint.input(_first_present(endpoint, "Fac|Factor")), owner)
 
     def function(values: Float32) -> Float32:

@@ -12,7 +12,7 @@ from mathutils import Euler
 from ...core.environment import resized_map
 from ...core.scene import Environment, Float32, Float64
 from . import node_operations
-from .color_space import convert
+from .color_space import into_rec709
 from .image_pixels import MISSING_COLOR, image_pixels
 from .materials import FindingList
 from .node_graph import Endpoint, node_label, node_tree_of, source
@@ -100,7 +100,7 @@ def read_world(world: Any | None, to_rec709: Float64, report: FindingList) -> tu
     evaluator = _WorldEvaluator(to_rec709, report)
     tree = node_tree_of(world)
     if tree is None:
-        return _rgb(convert(np.array(world.color, np.float32), to_rec709)), None
+        return _rgb(into_rec709(np.array(world.color, np.float32), to_rec709)), None
     output = tree.get_output_node("CYCLES")
     if output is None:
         return BLACK, None

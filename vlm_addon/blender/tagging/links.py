@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import bpy
 import numpy as np
 import numpy.typing as npt
 
@@ -78,6 +79,7 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
     things = chosen_light_meshes(context)
     stored = {thing.name: (read_links(thing), made.get(thing.data.name_full)) for thing in things}
     links = {name: make_links([*old.tolist(), *new]) for name, (old, new) in stored.items() if new is not None}
+    _leave_edit_mode(context)
     for each in untagged:
         tags = read_faces(each.thing, TAG_ATTRIBUTE)
         tags[each.faces & (tags == UNTAGGED)] = light_ids[each.mesh]
@@ -110,10 +112,17 @@ def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
             require_editable(thing)
             remaining[thing.name] = links[~taken]
             gone.append(links[taken])
+    _leave_edit_mode(context)
     for name, links in remaining.items():
         write_links(context.scene.objects[name], links)
     pairs = np.concatenate(gone)
     return _told(context, len(pairs), chosen, receivers, pairs)
+
+
+def _leave_edit_mode(context: Any) -> None:
+    """Undo in edit mode knows the edited meshes alone, and links are stored on objects."""
+    if context.mode == "EDIT_MESH":
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def linked_text(linked: Linked) -> str:
