@@ -360,3 +360,22 @@ def test_what_changed_meanwhile_is_left_alone(make_grid, make_lights):
 @pytest.mark.parametrize(("count", "words"), [(0, ""), (1, "1 light"), (2000, "2,000 lights")])
 def test_numbers_are_told_in_words(count, words):
     assert light_tags.counted(count, "light") == words
+
+
+def test_walls_around_a_light_on_the_floor_are_not_what_it_stands_for(make_cube, scene):
+    room = make_cube("Room")
+    room.data.flip_normals()
+    bpy.context.view_layer.update()
+    lights = bpy.data.meshes.new("lights")
+    corners = [(x, y, -1.01) for x, y in ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9))]
+    lights.from_pydata(corners, [], [(0, 1, 2, 3)])
+    thing = bpy.data.objects.new("VLM", lights)
+    thing["vlm_schema"] = 2
+    scene.collection.objects.link(thing)
+    bpy.context.view_layer.update()
+    tagging = tag_pairing.read_tagging(bpy.context, [thing])
+    tag_pairing.write_retagged(bpy.context, tag_pairing.pair(tagging, silent))
+    tags = read_faces(room, "vlm_tag")
+    floor = np.array([polygon.center.z < -0.9 for polygon in room.data.polygons])
+    assert (tags[floor] != 0).all()
+    assert not tags[~floor].any()

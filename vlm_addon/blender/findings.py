@@ -24,8 +24,9 @@ Int64 = npt.NDArray[np.int64]
 CHECK_AGAIN = "run Check again"
 TAGGED = (kinds.THIN, kinds.TWO_SIDED)
 """Kinds whose fix is a tag: Blender's faces get them, not triangles."""
-MEANT = (kinds.BRIGHT,)
-"""Kinds that an artist may have wanted: only their own button mends them."""
+MEANT = (kinds.BRIGHT, kinds.OVERLAPPING)
+"""Kinds that an artist may have wanted, or that may be told where nothing is wrong (lights of crossing or stacked
+surfaces look as if they overlapped): only their own button mends them."""
 
 
 class VLM_PG_mark(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming of classes)

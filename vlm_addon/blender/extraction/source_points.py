@@ -84,7 +84,8 @@ def _points_on_lights(light_mesh: VirtualLightMesh, samples_per_light: int) -> S
     return sample_regions(light_mesh.corners, each, sample_counts(light_mesh.areas, samples_per_light))
 
 
-def _unit_normals(corners: Float64) -> Float64:
+def unit_normals(corners: Float64) -> Float64:
+    """(n, 3) unit normals of triangles (n, 3, 3), 0 for those without area."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
@@ -98,7 +99,7 @@ class VisibleSurface:
         positions = np.concatenate([mesh.positions for mesh in meshes])
         triangles = np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)])
         self._middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
-        self._normals = _unit_normals(positions[triangles])
+        self._normals = unit_normals(positions[triangles])
         local = (positions - self._middle).tolist()
         self._tree = BVHTree.FromPolygons(local, triangles.tolist(), all_triangles=True)
 

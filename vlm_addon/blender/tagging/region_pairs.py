@@ -19,7 +19,7 @@ from ...core.progress import Progress, step
 from ...core.sampling import sample_counts, sample_regions
 from ...core.scene import Float64, Mesh
 from ...core.triangle_distance import flat_triangles
-from ..extraction.source_points import VisibleSurface
+from ..extraction.source_points import SIMILAR_COSINE, VisibleSurface, unit_normals
 from ..light_geometry import LightFaces
 
 SAMPLES_PER_LIGHT = 16
@@ -87,7 +87,8 @@ def _stands_for(lights: Sequence[SourceLights], mesh: int) -> Bool:
 
 
 def _near_enough(light_corners: Float64, known: Int64, corners: Float64) -> Int64:
-    """(t,) the nearest of the light triangles `known`, NO_LIGHT where it is farther away than its longest edge."""
+    """(t,) the nearest of the light triangles `known`, NO_LIGHT where it is farther away than its longest edge or faces
+    another way: the walls around a light on the floor are not what it stands for."""
     nearest = light_of_triangles(light_corners[known], corners)
     rows = np.flatnonzero(nearest >= 0)
     own = light_corners[known[nearest[rows]]]
@@ -95,7 +96,8 @@ def _near_enough(light_corners: Float64, known: Int64, corners: Float64) -> Int6
     middles = corners[rows].mean(axis=1)
     squared = flat_triangles(own).squared_distances(middles, np.arange(len(rows)))
     result = np.full(len(corners), NO_LIGHT, np.int64)
-    near = squared <= edges**2
+    alike = np.einsum("ij,ij->i", unit_normals(own), unit_normals(corners[rows])) >= SIMILAR_COSINE
+    near = (squared <= edges**2) & alike
     result[rows[near]] = known[nearest[rows[near]]]
     return result
 
