@@ -34,6 +34,8 @@ def draw(path: Path, rows: Sequence[Point], title: str) -> None:
     for panel, scene in zip(axes[0], scenes, strict=True):
         for way, style in _STYLES.items():
             own = [row for row in rows if row.scene == scene and row.way == way]
+            if not own:
+                continue
             color = f"C{list(_STYLES).index(way)}"
             panel.plot(*_line((row.lights, row.mean_error) for row in own), style, color=color, label=way)
             plain = [(row.lights, row.plain_mean) for row in own if row.plain_mean == row.plain_mean]
