@@ -7,6 +7,7 @@ from bpy.types import Operator
 from ..vlm_addon.blender import authoring
 from ..vlm_addon.blender.tagging import light_tags
 from ..vlm_addon.core.errors import VlmError
+from ..vlm_addon.core.tag_pairs import FIRST_AUTOMATIC
 
 
 class VLM_OT_assign_tag(Operator):  # noqa: N801 (Blender's naming of classes)
@@ -17,7 +18,13 @@ the lights of their own id"""
     bl_label = "Assign Tag"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
 
-    tag: bpy.props.IntProperty(name="Tag", description="The id; 0 takes one that nothing has yet", min=0, default=0)
+    tag: bpy.props.IntProperty(
+        name="Tag",
+        description="The id; 0 takes one that nothing has yet. Larger ids than the limit come from pairing",
+        min=0,
+        max=FIRST_AUTOMATIC - 1,
+        default=0,
+    )
 
     @classmethod
     def poll(cls, context):

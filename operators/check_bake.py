@@ -27,5 +27,5 @@ class VLM_OT_check_bake(Operator):  # noqa: N801 (Blender's naming of classes)
             return {"CANCELLED"}
         for change in changes:
             self.report({"WARNING"}, f"Out of date: {change}")
-        self.report({"INFO"}, f"{len(changes)} differences to the bake")
+        self.report({"INFO"}, f"Differences to the bake: {len(changes)}")
         return {"FINISHED"}

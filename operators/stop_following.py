@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from ..vlm_addon.blender import authoring
+from ..vlm_addon.blender import authoring, light_colors
 from ..vlm_addon.blender.following import animation
 from ..vlm_addon.core.errors import VlmError
 
@@ -25,5 +25,5 @@ class VLM_OT_stop_following(Operator):  # noqa: N801 (Blender's naming of classe
         except VlmError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Freed {count} light meshes")
+        self.report({"INFO"}, f"Freed {light_colors.light_mesh_count(count)}")
         return {"FINISHED"}
