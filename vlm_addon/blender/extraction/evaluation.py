@@ -108,7 +108,9 @@ def with_render_depsgraph(scene: Any, view_layer: Any, function: Callable[[Any],
                 use_single_layer=False,
             )
         )
-        bpy.ops.render.render(scene=scene.name)
+        # by its name, a linked scene could be taken for a local one of the same name
+        with bpy.context.temp_override(scene=scene):
+            bpy.ops.render.render()
     if kept.error is not None:
         raise kept.error
     if not results:
