@@ -17,7 +17,7 @@ from ..core.scene import Finding
 from ..core.spans import numbers_in, parse_spans, spans_text
 from .extraction.light_mesh_io import LightOrigins
 from .light_faces import face_count, select_faces
-from .light_meshes import light_meshes
+from .light_meshes import is_local, light_meshes
 
 Int64 = npt.NDArray[np.int64]
 
@@ -109,6 +109,8 @@ def select_offenders(context: Any, index: int) -> int:
         raise InvalidInput(f"finding {index}", "it is about no faces of a light mesh", "read what to do in its text")
     things = [scene.objects[name] for name in faces]
     for thing in things:
+        if not is_local(thing):
+            raise InvalidInput(f"light mesh {thing.name!r}", "it is linked from another file", "make it local first")
         if not thing.visible_get(view_layer=context.view_layer):
             raise InvalidInput(f"light mesh {thing.name!r}", "it is hidden", "show it in the outliner")
     if set(context.objects_in_mode) != set(things) or context.mode != "EDIT_MESH":

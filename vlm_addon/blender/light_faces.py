@@ -39,19 +39,19 @@ DTYPES: dict[str, npt.DTypeLike] = {"FLOAT_COLOR": np.float32, "INT": np.int32, 
 
 def face_count(thing: Any) -> int:
     """Faces of a mesh object, as it is being edited."""
-    return len(bmesh.from_edit_mesh(thing.data).faces) if thing.mode == "EDIT" else len(thing.data.polygons)
+    return len(bmesh.from_edit_mesh(thing.data).faces) if thing.data.is_editmode else len(thing.data.polygons)
 
 
 def chosen_faces(thing: Any) -> Bool:
     """(n,) bool: the selected, visible faces in edit mode; all faces otherwise."""
-    if thing.mode != "EDIT":
+    if not thing.data.is_editmode:
         return np.ones(len(thing.data.polygons), bool)
     return np.array([face.select and not face.hide for face in bmesh.from_edit_mesh(thing.data).faces], bool)
 
 
 def select_faces(thing: Any, chosen: Bool) -> None:
     """Select just the faces of `chosen`, (n,) bool, in edit mode or for the next time that it is entered."""
-    if thing.mode == "EDIT":
+    if thing.data.is_editmode:
         edited = bmesh.from_edit_mesh(thing.data)
         for face, select in zip(edited.faces, chosen.tolist(), strict=True):
             face.select_set(select)
@@ -82,7 +82,7 @@ def _drop_broken_edge_selection(mesh: Any) -> None:
 def read_faces(thing: Any, name: str) -> npt.NDArray[Any]:
     """Values per face of an attribute of TYPES: (n,) or (n, 4), float32 or int32; its default where it is missing."""
     kind = TYPES[name]
-    if thing.mode == "EDIT":
+    if thing.data.is_editmode:
         edited = bmesh.from_edit_mesh(thing.data)
         layer = getattr(edited.faces.layers, LAYERS[kind]).get(name)
         values = _defaults(name, len(edited.faces)) if layer is None else _layer_values(edited, layer, kind)
@@ -101,7 +101,7 @@ def write_faces(thing: Any, name: str, values: npt.NDArray[Any]) -> None:
     """
     kind = TYPES[name]
     rows = np.ascontiguousarray(values, DTYPES[kind])
-    if thing.mode == "EDIT":
+    if thing.data.is_editmode:
         edited = bmesh.from_edit_mesh(thing.data)
         layers = getattr(edited.faces.layers, LAYERS[kind])
         layer = layers.get(name) or layers.new(name)

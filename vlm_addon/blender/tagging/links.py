@@ -79,7 +79,8 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
     things = chosen_light_meshes(context)
     stored = {thing.name: (read_links(thing), made.get(thing.data.name_full)) for thing in things}
     links = {name: make_links([*old.tolist(), *new]) for name, (old, new) in stored.items() if new is not None}
-    _leave_edit_mode(context)
+    if untagged or bare or any(len(links[name]) > len(stored[name][0]) for name in links):
+        _leave_edit_mode(context)
     for each in untagged:
         tags = read_faces(each.thing, TAG_ATTRIBUTE)
         tags[each.faces & (tags == UNTAGGED)] = light_ids[each.mesh]
@@ -112,7 +113,8 @@ def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
             require_editable(thing)
             remaining[thing.name] = links[~taken]
             gone.append(links[taken])
-    _leave_edit_mode(context)
+    if remaining:
+        _leave_edit_mode(context)
     for name, links in remaining.items():
         write_links(context.scene.objects[name], links)
     pairs = np.concatenate(gone)
