@@ -247,7 +247,9 @@ def press_all(situation, arrange):
     yield from to_page(0)
     look(situation.replace(" ", "_"))
     for name, (page, place) in found.items():
-        if name in LEFT_OUT or any(told["done"] for told in STORY["pressed"].get(name, {}).values()):
+        if name in LEFT_OUT or any(
+            f"VLM_OT_{name}" in told["done"] for told in STORY["pressed"].get(name, {}).values()
+        ):
             continue
         with over("UI"):
             enabled = getattr(bpy.ops.vlm, name).poll()

@@ -194,3 +194,15 @@ def shells_of(edges: HalfEdges, triangle_count: int, open_faces: Bool) -> tuple[
     one = np.flatnonzero(edges.twin > np.arange(len(edges.twin)))
     count, shell = connected_components(triangle_count, one // 3, edges.twin[one] // 3)
     return shell, np.bincount(shell[open_faces], minlength=count) == 0
+
+
+def unit_normals(corners: Float64) -> Float64:
+    """(n, 3) unit normals of triangles (n, 3, 3), 0 for those without area."""
+    return normals_and_areas(corners)[0]
+
+
+def normals_and_areas(corners: Float64) -> tuple[Float64, Float64]:
+    """(n, 3) unit normals of triangles (n, 3, 3), 0 for those without area, and (n,) areas, m²."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    return normal / np.where(length > 0, length, 1.0)[:, None], 0.5 * length

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .light_mesh import VirtualLightMesh
-from .mesh_topology import Int64, Rows
+from .mesh_topology import Int64, Rows, normals_and_areas
 from .morton import morton_codes
 from .scene import Float64, Int32, Mesh
 from .triangle_distance import FlatTriangles, flat_triangles
@@ -41,7 +41,7 @@ def light_of_triangles(light_corners: Float64, source_corners: Float64) -> Int32
     nearest = np.full(len(source_corners), -1, np.int32)
     if not len(light_corners) or not len(source_corners):
         return nearest
-    middle, normal = source_corners.mean(axis=1), _unit_normals(source_corners)[0]
+    middle, normal = source_corners.mean(axis=1), normals_and_areas(source_corners)[0]
     axis = np.abs(normal).argmax(axis=1)
     side = 2 * axis + (normal[np.arange(len(normal)), axis] < 0)
     order = np.lexsort([morton_codes(middle), side])
@@ -64,7 +64,7 @@ class _Lights:
 
     @staticmethod
     def of(corners: Float64) -> _Lights:
-        normal, area = _unit_normals(corners)
+        normal, area = normals_and_areas(corners)
         low, high = corners.min(axis=1), corners.max(axis=1)
         return _Lights(flat_triangles(corners), low, high, corners.mean(axis=1), normal, area)
 
@@ -151,10 +151,3 @@ def _batches(lengths: Int64) -> Iterator[Int64]:
     batch = np.cumsum(lengths) // PAIRS_PER_BATCH
     at = np.flatnonzero(np.diff(batch)) + 1
     yield from np.split(np.arange(len(lengths)), at)
-
-
-def _unit_normals(corners: Float64) -> tuple[Float64, Float64]:
-    """(unit normals, 0 where degenerate; areas in m²)."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    return normal / np.where(length > 0, length, 1.0)[:, None], 0.5 * length

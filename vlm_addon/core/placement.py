@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .least_push import least_push
-from .mesh_topology import Bool, Int64, Rows, sum_by, vertex_faces
+from .mesh_topology import Bool, Int64, Rows, normals_and_areas, sum_by, unit_normals, vertex_faces
 from .scene import Float64
 from .triangle_distance import flat_triangles
 from .triangle_tree import build_tree
@@ -78,7 +78,7 @@ def place_behind(
     around = vertex_faces(triangles, len(positions))
     bodies = build_tree(positions[triangles]), build_tree(source_corners)
     surface_points = _surface_points(positions, facing, source_corners, around)
-    longest = LARGEST_STEP * _smallest_around(np.sqrt(_normals(positions[triangles])[1]), around)
+    longest = LARGEST_STEP * _smallest_around(np.sqrt(normals_and_areas(positions[triangles])[1]), around)
     # What moves by the insets alone is not looked at: no body that shows is that thin.
     least = INSETS_UNSEEN * _largest_around(inset, around)
     moved = least_push(positions, triangles, facing, source_corners, inset, lambda share: report(PUSH_TIME * share))
@@ -89,7 +89,7 @@ def place_behind(
         if round_:
             corners = (positions + moved)[triangles]
             wanted = intrusions(corners, facing, source_corners) + inset
-            moved = moved + _behind_planes(_normals(corners)[0], wanted, around)
+            moved = moved + _behind_planes(unit_normals(corners), wanted, around)
         moved = _shortened(moved, longest)
         length = np.linalg.norm(moved, axis=1)
         fresh = np.linalg.norm(moved - looked_at, axis=1) > np.maximum(least, 0.01 * length)
@@ -111,7 +111,7 @@ def insets(corners: Float64) -> Float64:
     """(n,) m: how far each light is set behind a surface that it lies in exactly."""
     points = corners.reshape(-1, 3)
     half_diagonal = 0.5 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    return np.minimum(INSET_SHARE * half_diagonal, LARGEST_INSET * np.sqrt(_normals(corners)[1]))
+    return np.minimum(INSET_SHARE * half_diagonal, LARGEST_INSET * np.sqrt(normals_and_areas(corners)[1]))
 
 
 def intrusions(corners: Float64, regions: Rows, source_corners: Float64) -> Float64:
@@ -119,7 +119,7 @@ def intrusions(corners: Float64, regions: Rows, source_corners: Float64) -> Floa
 
     Negative where the plane lies behind the whole region; -inf for a light without one.
     """
-    normals, _ = _normals(corners)
+    normals, _ = normals_and_areas(corners)
     owner = np.repeat(np.arange(len(corners)), regions.lengths)
     offset = source_corners[regions.values] - corners[owner, :1]
     height = np.einsum("ikj,ij->ik", offset, normals[owner]).min(axis=1)
@@ -134,26 +134,19 @@ def share_in_front(corners: Float64, regions: Rows, source_corners: Float64) -> 
 
     Judged at the corners and the middle of every source triangle.
     """
-    normals, _ = _normals(corners)
+    normals, _ = normals_and_areas(corners)
     owner = np.repeat(np.arange(len(corners)), regions.lengths)
     points = source_corners[regions.values]
     points = np.concatenate([points, points.mean(axis=1, keepdims=True)], axis=1)
     height = np.einsum("ikj,ij->ik", points - corners[owner, :1], normals[owner])
-    weight = _normals(source_corners[regions.values])[1]
+    weight = normals_and_areas(source_corners[regions.values])[1]
     behind = (height < -0.5 * insets(corners)[owner, None]).mean(axis=1)
     return float(behind @ weight / max(weight.sum(), np.finfo(float).tiny)) if len(weight) else 0.0
 
 
-def _normals(corners: Float64) -> tuple[Float64, Float64]:
-    """(unit normals (n, 3), 0 where degenerate, areas (n,))."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    return normal / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
-
-
 def _facing_regions(corners: Float64, regions: Rows, source_corners: Float64) -> Rows:
     owner = np.repeat(np.arange(len(corners)), regions.lengths)
-    cosine = np.einsum("ij,ij->i", _normals(source_corners[regions.values])[0], _normals(corners)[0][owner])
+    cosine = np.einsum("ij,ij->i", unit_normals(source_corners[regions.values]), unit_normals(corners)[owner])
     keep = cosine > STEEPEST_COSINE
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(corners)))])
     return Rows(regions.values[keep], starts)
@@ -257,12 +250,12 @@ def _without_flips(positions: Float64, moved: Float64, triangles: Int64, towards
 
     towards: (n, 3) where the region of each light faces; no light may turn further away from it than at the start.
     """
-    before, area_before = _normals(positions[triangles])
+    before, area_before = normals_and_areas(positions[triangles])
     facing_before = np.einsum("ij,ij->i", before, towards)
     moved = moved.copy()
     halvings = 0
     while True:
-        after, area_after = _normals((positions + moved)[triangles])
+        after, area_after = normals_and_areas((positions + moved)[triangles])
         turned = np.einsum("ij,ij->i", before, after) < LEAST_TURN_COSINE
         turned |= np.einsum("ij,ij->i", after, towards) < np.minimum(LEAST_TURN_COSINE, facing_before)
         bad = (turned | (area_after < LEAST_AREA_SHARE * area_before)) & (area_before > 0)

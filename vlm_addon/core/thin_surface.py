@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .light_mesh import VirtualLightMesh
-from .mesh_topology import Bool, Int64, closed_shells, weld
+from .mesh_topology import Bool, Int64, closed_shells, unit_normals, weld
 from .nearest_lights import light_of_triangles
 from .placement import STEEPEST_COSINE, THICKNESS_SHARE, insets
 from .sampling import square_to_triangle
@@ -76,7 +76,7 @@ def thin_against(light_corners: Float64, lights: Lights, corners: Float64, tree:
     """
     rows = np.flatnonzero(lights >= 0)
     light = lights[rows]
-    light_normals, normals = _unit_normals(light_corners), _unit_normals(corners)
+    light_normals, normals = unit_normals(light_corners), unit_normals(corners)
     cosine = np.einsum("ij,ij->i", normals[rows], light_normals[light])
     rows, light = rows[cosine > STEEPEST_COSINE], light[cosine > STEEPEST_COSINE]
     height = np.einsum("ikj,ij->ik", corners[rows] - light_corners[light, :1], light_normals[light])
@@ -150,7 +150,7 @@ def _met_sides(points: Float64, directions: Float64, gap: Float64, tree: Triangl
     diagonal = float(np.linalg.norm(corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))))
     start = points + START_SHARE * diagonal * directions
     met, fraction = tree.first_met_at(start, points + diagonal * directions)
-    facing = np.einsum("ij,ij->i", _unit_normals(corners[met]), directions) < 0
+    facing = np.einsum("ij,ij->i", unit_normals(corners[met]), directions) < 0
     front: Bool = (met >= 0) & facing & (fraction * diagonal > gap)
     return front, (met >= 0) & ~front
 
@@ -178,9 +178,3 @@ def _back_rays(corners: Float64, region: Int64, count: int) -> tuple[Float64, Fl
     # Normal plus a uniform direction is spread by the cosine.
     directions = -unit + 0.999 * ball / np.linalg.norm(ball, axis=1, keepdims=True)
     return points, directions / np.linalg.norm(directions, axis=1, keepdims=True)
-
-
-def _unit_normals(corners: Float64) -> Float64:
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .form_factor import paired_form_factor
-from .mesh_topology import Bool, Int64, Rows, sum_by
+from .mesh_topology import Bool, Int64, Rows, sum_by, unit_normals
 from .placement import insets
 from .sampling import sample_regions
 from .scene import Float64
@@ -164,7 +164,7 @@ def _places(corners: Float64, inset: Float64, regions: Rows, source_corners: Flo
     places, steps = [], []
     for change, start in enumerate((corners, _centred(corners, regions, source_corners))):
         depths = _depths(start, inset, regions, source_corners)
-        normal, middle = _unit_normals(start), start.mean(axis=1, keepdims=True)
+        normal, middle = unit_normals(start), start.mean(axis=1, keepdims=True)
         shrunk = middle[:, None] + shrinks[:, :, None, None] * (start - middle)[:, None]
         places.append(shrunk[:, :, None] - (depths[:, :, None] * normal[:, None])[:, None, :, None, :])
         steps.append(2 * change + np.arange(len(SHRINKS))[:, None] + np.arange(depths.shape[1])[None])
@@ -182,9 +182,9 @@ def _centred(corners: Float64, regions: Rows, source_corners: Float64) -> Float6
         return np.stack([sum_by(owner, values[:, axis] * area, len(corners)) for axis in range(3)], axis=1) / total
 
     centre = mean(source_corners[regions.values].mean(axis=1))
-    facing = mean(_unit_normals(source_corners[regions.values]))
+    facing = mean(unit_normals(source_corners[regions.values]))
     length = np.linalg.norm(facing, axis=1, keepdims=True)
-    facing = np.where(length > LEAST_FACING, facing / np.maximum(length, LEAST_FACING), _unit_normals(corners))
+    facing = np.where(length > LEAST_FACING, facing / np.maximum(length, LEAST_FACING), unit_normals(corners))
     across = corners[:, 1] - corners[:, 0]
     across = across - np.einsum("ij,ij->i", across, facing)[:, None] * facing
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -199,7 +199,7 @@ def _depths(corners: Float64, inset: Float64, regions: Rows, source_corners: Flo
     """(n, 1 + DEPTHS) m: how far back to move each light: not at all, or to behind its whole region and beyond."""
     owner = np.repeat(np.arange(len(corners)), regions.lengths)
     offset = source_corners[regions.values] - corners[owner, :1]
-    height = np.einsum("ikj,ij->ik", offset, _unit_normals(corners)[owner]).min(axis=1)
+    height = np.einsum("ikj,ij->ik", offset, unit_normals(corners)[owner]).min(axis=1)
     deepest = np.zeros(len(corners))
     np.minimum.at(deepest, owner, height)
     size = np.sqrt(_areas(corners))
@@ -217,12 +217,12 @@ def _spans(corners: Float64, regions: Rows, source_corners: Float64) -> Float64:
 
 def _inside(corners: Float64, span: Float64, tree: TriangleTree) -> Bool:
     """(n,) whether all corners and the middle of each light look along its normal at the back of a surface."""
-    way = span[:, None] * _unit_normals(corners)
+    way = span[:, None] * unit_normals(corners)
     inside = np.ones(len(corners), bool)
     for points in (corners.mean(axis=1), *np.moveaxis(corners, 1, 0)):
         rows = np.flatnonzero(inside)
         met = tree.first_met(points[rows], points[rows] + way[rows])
-        facing = np.einsum("ij,ij->i", _unit_normals(tree.corners[met]), way[rows]) > 0
+        facing = np.einsum("ij,ij->i", unit_normals(tree.corners[met]), way[rows]) > 0
         inside[rows] = (met >= 0) & facing
     return inside
 
@@ -245,9 +245,3 @@ def _areas(corners: Float64) -> Float64:
 
 def _vectors(corners: Float64) -> Float64:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
-def _unit_normals(corners: Float64) -> Float64:
-    normals = _vectors(corners)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)

@@ -15,7 +15,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
 from ...core.light_mesh import SourceSamples, VirtualLightMesh
-from ...core.mesh_topology import Bool, Rows
+from ...core.mesh_topology import Bool, Rows, unit_normals
 from ...core.sampling import sample_counts, sample_regions
 from ...core.scene import Float64, Mesh
 
@@ -82,13 +82,6 @@ def _points_on_lights(light_mesh: VirtualLightMesh, samples_per_light: int) -> S
     """Stratified points on the lights themselves, with the lights' normals."""
     each = Rows(np.arange(len(light_mesh)), np.arange(len(light_mesh) + 1))
     return sample_regions(light_mesh.corners, each, sample_counts(light_mesh.areas, samples_per_light))
-
-
-def unit_normals(corners: Float64) -> Float64:
-    """(n, 3) unit normals of triangles (n, 3, 3), 0 for those without area."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
 
 
 class VisibleSurface:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ...core.display_colors import hdr_colors, heat_colors, tag_colors
 from ...core.errors import InvalidInput
 from ...core.grid_samples import Cells
+from ...core.mesh_topology import unit_normals
 from ...core.overlay_lines import box_lines, half_ball_lines, normal_lines, outlines
 from ...core.scene import UNTAGGED, Float32, Float64, Int32
 from ..extraction.color_space import convert, working_to_rec709
@@ -112,7 +113,7 @@ def half_ball_shape(thing: Any, faces: LightFaces, reach: float) -> Shape:
     corners = faces.corners[chosen_faces(thing)[faces.faces]][:MOST_HALF_BALLS]
     centres = corners.mean(axis=1)
     radii = reach * np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1, initial=0.0)
-    return lines(half_ball_lines(centres, _unit_normals(corners), radii), HALF_BALL_COLOR)
+    return lines(half_ball_lines(centres, unit_normals(corners), radii), HALF_BALL_COLOR)
 
 
 def finding_shapes(scene: Any, thing: Any, faces: LightFaces, alpha: float) -> list[Shape]:
@@ -200,10 +201,3 @@ def _normals(faces: LightFaces) -> tuple[Float64, Float64]:
     total = np.stack([np.bincount(faces.faces, weights=axis, minlength=faces.count) for axis in vectors.T], axis=1)
     areas = np.linalg.norm(total, axis=1)
     return total / np.where(areas > 0.0, areas, 1.0)[:, None], areas
-
-
-def _unit_normals(corners: Float64) -> Float64:
-    a, b, c = np.moveaxis(corners, 1, 0)
-    vectors = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.where(lengths > 0.0, lengths, 1.0))

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.mesh_topology import Bool, Int64
+from ...core.mesh_topology import Bool, Int64, unit_normals
 from ...core.nearest_lights import light_of_triangles
 from ...core.progress import Progress, step
 from ...core.sampling import sample_counts, sample_regions
 from ...core.scene import Float64, Mesh
 from ...core.triangle_distance import flat_triangles
-from ..extraction.source_points import SIMILAR_COSINE, VisibleSurface, unit_normals
+from ..extraction.source_points import SIMILAR_COSINE, VisibleSurface
 from ..light_geometry import LightFaces
 
 SAMPLES_PER_LIGHT = 16
