@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+bpy = pytest.importorskip("bpy", reason="bpy is not installed in this Python")
+
 CAMPAIGN = Path(__file__).with_name("survival_campaign.py")
 ROOT = Path(__file__).resolve().parents[2]
 SEQUENCES, ALL_SEQUENCES = 5, 500
@@ -35,6 +37,38 @@ def campaign(folder, sequences, python=sys.executable, first=0):
 
 def sentences(told):
     return [f"{each['seed']}: {each['sentence']} after {each['steps']}" for each in told["failures"]]
+
+
+def flipped_and_undone(path, saves):
+    """Corners of a cube's faces before its normals are flipped in edit mode and after that is undone.
+
+    saves: whether the file is saved in between, in edit mode.
+    """
+
+    def corners():
+        bpy.context.view_layer.update()
+        return [tuple(face.vertices) for face in bpy.context.object.data.polygons]
+
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.ed.undo_push(message="cube")
+    before = corners()
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.flip_normals()
+    bpy.ops.ed.undo_push(message="flipped")
+    if saves:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.ed.undo()
+    return before, corners()
+
+
+def test_blender_alone_loses_what_an_edited_mesh_was_before_once_the_file_is_saved(tmp_path):
+    """Why the campaign does not compare such meshes at earlier steps: where this fails, Blender has mended it."""
+    assert not dir(bpy.ops.vlm)
+    before, after = flipped_and_undone(tmp_path / "cube.blend", saves=False)
+    assert after == before
+    before, after = flipped_and_undone(tmp_path / "cube.blend", saves=True)
+    assert after != before
 
 
 def test_a_few_sequences_survive(tmp_path):
