@@ -61,7 +61,7 @@ def add_tags(
     """
     lights, faces = np.asarray(lights, np.int64), np.asarray(faces, np.int64)
     light_tags, face_tags = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
-    _take_common_tag(lights, faces, light_tags, face_tags)
+    take_common_tag(lights, faces, light_tags, face_tags)
     open_ = unpaired(lights, faces, light_tags, face_tags, links)
     lights, faces = lights[open_], faces[open_]
     fresh = np.unique(lights[light_tags[lights] == UNTAGGED])
@@ -81,7 +81,7 @@ def add_tags(
     return RegionTags(light_tags, face_tags, make_links(np.concatenate([known, added])))
 
 
-def _take_common_tag(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32) -> None:
+def take_common_tag(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32) -> None:
     """Give lights without a tag that of their faces, where all of these carry one and the same."""
     low = np.full(len(light_tags), np.iinfo(np.int32).max, np.int64)
     high = np.full(len(light_tags), UNTAGGED, np.int64)

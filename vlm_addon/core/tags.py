@@ -27,6 +27,7 @@ __all__ = [
     "ThinSurface",
     "light_of_triangles",
     "next_tag",
+    "numbered_sets",
     "pair_nearest",
     "region_tags",
     "separated_tags",
@@ -79,7 +80,7 @@ def region_tags(
     if alone.all():
         return RegionTags(light_tags, face_tags, no_links())
     face, member = face[~alone], member[~alone]
-    shared, number = _sets(face, member, groups)
+    shared, number = numbered_sets(face, member, groups)
     face_tags[shared] = first_tag + groups + number
     links = np.stack([first_tag + member, face_tags[face]], axis=1)
     return RegionTags(light_tags, face_tags, make_links(links))
@@ -95,7 +96,7 @@ def _checked(light_of_triangle: npt.ArrayLike, face_of_triangle: npt.ArrayLike) 
     return lights, faces
 
 
-def _sets(face: Int64, member: Int64, members: int) -> tuple[Int64, Int64]:
+def numbered_sets(face: Int64, member: Int64, members: int) -> tuple[Int64, Int64]:
     """(each face once, ascending; the number from 0 of the set of its members). Faces of equal sets share a number.
 
     Sets are told apart by the sum of a random 64-bit number for each member (Zobrist 1970): of a million sets, two
