@@ -18,12 +18,20 @@ class VLM_OT_link_receiver(Operator):  # noqa: N801 (Blender's naming of classes
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
 
     receiver: bpy.props.StringProperty(
-        name="Object", description="Object that gets no bounce of these lights; empty: all selected visible objects"
+        name="Object",
+        description="Object that gets no bounce of these lights; empty: all selected visible objects",
+        search=lambda self, context, text: links.receiver_names(context, text),
     )
 
     @classmethod
     def poll(cls, context):
         return authoring.allow(cls, availability.light_faces_problem(context))
+
+    def invoke(self, context, event):
+        """Ask for the object where none is selected: in Edit Mode of a light mesh none can be."""
+        if bpy.app.background or links.named_receivers(context, self.receiver):
+            return self.execute(context)
+        return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context):
         try:

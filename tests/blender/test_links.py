@@ -239,3 +239,12 @@ def test_an_object_linked_from_another_file_needs_a_tag_there(make_plane, make_l
         link()
     assert "vlm_links" not in lights
     assert "vlm_tag" not in lights.data.attributes
+
+
+def test_the_objects_that_can_be_left_out_are_offered_by_name(make_plane, make_lights):
+    make_plane("Wall")
+    make_plane("Small wall")
+    make_plane("Floor")
+    make_lights("Wall lights")
+    assert links.receiver_names(bpy.context, "WALL") == ["Small wall", "Wall"]
+    assert links.receiver_names(bpy.context, "") == ["Floor", "Small wall", "Wall"]

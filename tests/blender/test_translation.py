@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every operator and panel has a German name, and Blender shows it."""
 
+import ast
 from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
 import pytest
 
-from vlm_addon.blender.interface import german, panels, render_panels, translation
+from vlm_addon.blender.baking import bake_state
+from vlm_addon.blender.drawing.draw_tool import TOOLS
+from vlm_addon.blender.following.animation import LEFT_BEHIND
+from vlm_addon.blender.interface import availability, german, panels, render_panels, translation
 from vlm_addon.blender.interface.properties import ensure_scene_settings
+from vlm_addon.blender.overlays import overlays
+from vlm_addon.core import finding_kinds
 
 OPERATORS = Path(__file__).resolve().parents[2] / "operators"
 
@@ -83,3 +89,43 @@ def test_an_operator_that_is_not_there_stops_nothing():
     texts = translation.messages()["de_DE"]
     assert ("Operator", "Light Scene") not in texts
     assert texts["*", "Target Triangles"] == german.PROPERTIES["Target Triangles"]
+
+
+def told_by(module):
+    """The constant sentences that functions of a module return, or put into a badge."""
+    returned = [node.value for node in ast.walk(ast.parse(Path(module.__file__).read_text())) if is_return(node)]
+    constants = [node.value for value in returned for node in ast.walk(value) if isinstance(node, ast.Constant)]
+    return {text for text in constants if isinstance(text, str) and " " in text.strip()}
+
+
+def is_return(node):
+    """Of a whole sentence: what is put together of parts is not looked for."""
+    return (
+        isinstance(node, ast.Return)
+        and node.value
+        and not any(isinstance(part, ast.JoinedStr) for part in ast.walk(node.value))
+    )
+
+
+@pytest.mark.parametrize("module", [availability, overlays, bake_state])
+def test_what_panels_say_has_german_words(module):
+    sentences = told_by(module)
+    assert len(sentences) >= 3
+    assert sorted(sentences - set(german.SENTENCES)) == []
+
+
+def test_every_tool_has_a_german_name_and_tooltip():
+    assert {tool.label for tool in TOOLS} <= set(german.BUTTONS)
+    assert {tool.text for tool in TOOLS} <= set(german.SENTENCES)
+
+
+def test_every_kind_of_finding_has_german_words():
+    kinds = {value for name, value in vars(finding_kinds).items() if name.isupper() and isinstance(value, str)}
+    assert kinds | {LEFT_BEHIND} == set(german.FINDINGS)
+
+
+def test_words_that_blender_has_in_another_sense_are_ours(german_blender):
+    assert translation.told("Tags") == german.LABELS["Tags"]
+    assert translation.told("Nothing is baked") == german.SENTENCES["Nothing is baked"]
+    assert "7" in translation.told_finding("thin", "7 lights stand", 7) != "7 lights stand"
+    assert translation.told_finding("", "as it is", 7) == "as it is"

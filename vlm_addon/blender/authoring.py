@@ -24,6 +24,7 @@ from .extraction.light_mesh_io import Extraction, LightOrigins, extract, origins
 from .findings import list_findings
 from .following import animation
 from .interface.availability import has_geometry, light_mesh_objects, rendered_objects
+from .interface.translation import told
 from .light_faces import write_faces
 from .names import LOCK_ATTRIBUTE, NAME, SOURCES_PROPERTY
 from .tagging.source_faces import SourceFaces, read_source_faces
@@ -216,7 +217,7 @@ def render_in_window() -> None:
 def allow(operator: Any, problem: str | None) -> bool:
     """What `poll` returns; a problem becomes the tooltip of the disabled button."""
     if problem is not None:
-        operator.poll_message_set(problem)
+        operator.poll_message_set(told(problem))
     return problem is None
 
 

@@ -21,6 +21,7 @@ from ...core.bake_key import BakeKey, grid_changes, grid_key, surface_changes, s
 from ...core.errors import InvalidInput
 from ..extraction.light_mesh_io import extract
 from ..interface.availability import GEOMETRY_TYPES
+from ..interface.translation import told
 from ..light_grid_options import scene_grid_settings
 from ..light_meshes import light_meshes
 from . import bake_store
@@ -64,11 +65,12 @@ def badge(context: Any) -> Badge:
         return Badge(NONE, "Nothing is baked")
     known = _state(context)
     if not known.looked or known.scene != scene.name:
-        return Badge(UNKNOWN, "Baked earlier: compare to see whether it is up to date")
+        subject = "Light grid baked" if has_grid else "Light mesh made"
+        return Badge(UNKNOWN, f"{subject} earlier: compare to see whether it is up to date")
     if known.touched:
         return Badge(UNKNOWN, "The scene was changed: the bake may be out of date")
     if known.changes:
-        return Badge(OLD, f"Out of date: {known.changes}")
+        return Badge(OLD, f"{told('Out of date:')} {known.changes}")
     return Badge(CURRENT, "Up to date" if has_grid else "Up to date; no light grid is baked")
 
 

@@ -198,12 +198,17 @@ OPERATORS = {
 """Label and tooltip of each operator."""
 
 BUTTONS = {
+    "Light Polygon": "Lichtpolygon",
+    "Light Rectangle": "Lichtrechteck",
+    "Extrude Lights": "Lichter entlangziehen",
+    "Cut Lights": "Lichter schneiden",
+    "Erase Lights": "Lichter radieren",
     "Render Image": "Bild rendern",
     "Select": "Auswählen",
     "Fix": "Beheben",
     "Fix All": "Alles beheben",
 }
-"""Texts of buttons that differ from their operator's label, by the English ones."""
+"""Texts of buttons that differ from their operator's label, and names of tools, by the English ones."""
 
 LABELS = {
     "Animate": "Animieren",
@@ -215,8 +220,10 @@ LABELS = {
     "Detail": "Detail",
     "Draw": "Zeichnen",
     "Effects": "Effekte",
+    "Emission": "Emission",
     "Hue": "Farbton",
     "No light mesh yet": "Noch kein Lichtnetz",
+    "None": "Nichts",
     "Overlays": "Überlagerungen",
     "Presets": "Voreinstellungen",
     "Render": "Rendern",
@@ -272,3 +279,112 @@ PROPERTIES = {
     "World lights": "Lichter der Welt",
 }
 """Names of settings of the scene, the views and operators, by the English ones."""
+
+SENTENCES = {
+    "Click corners on a surface, or drag around an area: a virtual light behind it, in its colour": (
+        "Ecken auf einer Fläche klicken oder einen Bereich umfahren: ein virtuelles Licht dahinter, in ihrer Farbe"
+    ),
+    "Drag a rectangle on a surface: virtual lights behind it, in its colour": (
+        "Ein Rechteck auf eine Fläche ziehen: virtuelle Lichter dahinter, in ihrer Farbe"
+    ),
+    "Drag an edge of a virtual light along a surface: a strip of lights follows": (
+        "Eine Kante eines virtuellen Lichts an einer Fläche entlangziehen: Ein Streifen von Lichtern folgt"
+    ),
+    "Click or drag across virtual lights of the selected light meshes: they are cut in two": (
+        "Quer über virtuelle Lichter der gewählten Lichtnetze klicken oder ziehen: Sie werden zerteilt"
+    ),
+    "Drag over virtual lights of the selected light meshes to delete them": (
+        "Über virtuelle Lichter der gewählten Lichtnetze ziehen, um sie zu löschen"
+    ),
+    "Lights are drawn in Object Mode and in Edit Mode": (
+        "Lichter werden im Objektmodus und im Bearbeitungsmodus gezeichnet"
+    ),
+    "macOS stops at OpenGL 4.1: create, check and bake here, render on Linux or Windows": (
+        "macOS endet bei OpenGL 4.1: hier erstellen, prüfen und backen, unter Linux oder Windows rendern"
+    ),
+    "Blender's Python was not found, so the renderer cannot start: use an official build of Blender": (
+        "Blenders Python wurde nicht gefunden, der Renderer startet nicht: eine offizielle Ausgabe von Blender benutzen"
+    ),
+    "Nothing to make lights from: select the objects that should bounce light": (
+        "Nichts, woraus Lichter werden: die Objekte wählen, die Licht zurückwerfen sollen"
+    ),
+    "The active collection shows no surfaces: click one that holds meshes in the outliner": (
+        "Die aktive Sammlung zeigt keine Flächen: im Outliner eine mit Netzen anklicken"
+    ),
+    "Select the visible mesh first: detail is painted there, not on the light mesh": (
+        "Zuerst das sichtbare Netz wählen: Detail wird darauf gemalt, nicht auf dem Lichtnetz"
+    ),
+    "The scene shows no surfaces: add a mesh (Add > Mesh) or enable an object for rendering": (
+        "Die Szene zeigt keine Flächen: ein Netz hinzufügen oder ein Objekt für das Rendern einschalten"
+    ),
+    "Leave this mode first (Tab, or the menu at the left of the header): light meshes are made in Object Mode": (
+        "Zuerst diesen Modus verlassen (Tab oder das Menü links in der Kopfzeile): Lichtnetze werden im Objektmodus "
+        "gemacht"
+    ),
+    "Leave this mode first: lights are changed in Object Mode (all of a light mesh) or Edit Mode (selected)": (
+        "Zuerst diesen Modus verlassen: Lichter werden im Objektmodus (alle eines Lichtnetzes) oder im "
+        "Bearbeitungsmodus (die gewählten) geändert"
+    ),
+    "Select a light mesh (collection Virtual Light Meshes), or edit one and select faces": (
+        "Ein Lichtnetz wählen (Sammlung Virtual Light Meshes), oder eines bearbeiten und Flächen wählen"
+    ),
+    "Leave this mode first (Tab): whole light meshes are changed in Object Mode": (
+        "Zuerst diesen Modus verlassen (Tab): Ganze Lichtnetze werden im Objektmodus geändert"
+    ),
+    "Leave this mode first (Tab): tags of whole scenes are repaired in Object Mode": (
+        "Zuerst diesen Modus verlassen (Tab): Kennungen ganzer Szenen werden im Objektmodus repariert"
+    ),
+    "The scene has no virtual light mesh: create one first": "Die Szene hat kein Lichtnetz: zuerst eines erstellen",
+    "There are no findings: run Check first, or there is nothing wrong": (
+        "Es gibt keine Befunde: zuerst prüfen, oder es ist alles in Ordnung"
+    ),
+    "The scene has no camera: add one (Add > Camera) and aim it (View > Align View > Align Active Camera)": (
+        "Die Szene hat keine Kamera: eine hinzufügen und ausrichten"
+    ),
+    "Leave this mode first: tags are given in Object Mode (whole objects) or Edit Mode (selected faces)": (
+        "Zuerst diesen Modus verlassen: Kennungen werden im Objektmodus (ganze Objekte) oder im Bearbeitungsmodus "
+        "(gewählte Flächen) gegeben"
+    ),
+    "Select light meshes and the objects that they stand for, or edit them and select faces": (
+        "Lichtnetze und die Objekte wählen, für die sie stehen, oder sie bearbeiten und Flächen wählen"
+    ),
+    "There is no light mesh to show: create one first": "Es gibt kein Lichtnetz, das zu zeigen wäre: eines erstellen",
+    "Lights reach everywhere: Reach shows something with Lights set to Range (Render)": (
+        "Lichter reichen überallhin: Reichweite zeigt etwas, wo Lichter auf Reichweite steht (Rendern)"
+    ),
+    "No light grid is shown yet: press Show Light Grid": "Noch ist kein Lichtgitter da: Lichtgitter zeigen drücken",
+    "Nothing is baked": "Nichts ist gebacken",
+    "Nothing is baked: create a light mesh first": "Nichts ist gebacken: zuerst ein Lichtnetz erstellen",
+    "Light grid baked earlier: compare to see whether it is up to date": (
+        "Das Lichtgitter ist von früher: vergleichen, um zu sehen, ob es noch stimmt"
+    ),
+    "Light mesh made earlier: compare to see whether it is up to date": (
+        "Das Lichtnetz ist von früher: vergleichen, um zu sehen, ob es noch stimmt"
+    ),
+    "The scene was changed: the bake may be out of date": (
+        "Die Szene wurde geändert: Das Gebackene ist vielleicht veraltet"
+    ),
+    "Out of date:": "Veraltet:",
+    "Up to date": "Auf dem neuesten Stand",
+    "Up to date; no light grid is baked": "Auf dem neuesten Stand; kein Lichtgitter ist gebacken",
+}
+"""What tools and panels say, by the English sentences."""
+
+FINDINGS = {
+    "empty": "Das Lichtnetz hat keine Lichter: aus einer Auswahl erstellen oder Lichter zeichnen",
+    "not_finite": "Werte, die keine Zahlen sind ({count} Lichter): beheben oder löschen",
+    "negative": "Negative Werte ({count} Lichter): Werte von mindestens 0 benutzen",
+    "bad_samples": "Proben der sichtbaren Fläche sind keine Zahlen: die Fläche reparieren und neu erstellen",
+    "degenerate": "Lichter ohne Fläche ({count}): löschen oder ihre Ecken verschmelzen",
+    "non_manifold": "Lichter, die anders als ihre Nachbarn leuchten ({count}): umdrehen",
+    "unsampled": "Lichter ohne Fläche vor sich ({count}), die kein Licht erreicht: näher hinter eine rücken",
+    "inside_out": "Lichter, die von ihrer Fläche weg leuchten ({count}): umdrehen",
+    "in_front": "Lichter vor ihrer Fläche ({count}): dahinter rücken, oder beiden eine Kennung geben",
+    "thin": "Lichter vor einem Körper, der zu dünn ist, um dahinter zu liegen ({count}): beiden eine Kennung geben",
+    "two_sided": "Lichter für etwas, das auch von hinten zu sehen ist ({count}): beiden eine Kennung geben",
+    "overlapping": "Lichter, die auf anderen liegen, sodass sie doppelt zählen ({count}): löschen",
+    "bright": "Lichter, die mehr als alles zurückwerfen ({count}): erlaubt; dämpfen, wenn es nicht gemeint ist",
+    "lost_tag": "Kennungen, die keine Fläche hat ({count} Lichter): entfernen",
+    "left_behind": "Das Lichtnetz steht still, und woraus es gemacht ist, bewegt sich: Quelle folgen benutzen",
+}
+"""What the check found, by its kind; count: of faces."""

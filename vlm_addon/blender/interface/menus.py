@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from .translation import OWN_CONTEXT
 from .workflow import PIE, STEPS, Step, button
 
 MENU, PIE_MENU = "VLM_MT_main", "VLM_MT_pie"
@@ -32,7 +33,7 @@ def _draw_step(step: Step) -> Any:
 
 
 def _step_menu(step: Step) -> type:
-    members = {"bl_label": step.label, "draw": _draw_step(step)}
+    members = {"bl_label": step.label, "bl_translation_context": OWN_CONTEXT, "draw": _draw_step(step)}
     return type(f"VLM_MT_{step.name}", (bpy.types.Menu,), members)
 
 

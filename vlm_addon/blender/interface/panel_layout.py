@@ -6,6 +6,8 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from .translation import OWN_CONTEXT, told
+
 CATEGORY = "VLM"
 PIXELS_PER_CHARACTER = 7
 LEAST_CHARACTERS = 12
@@ -19,12 +21,13 @@ class SidebarPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = CATEGORY
+    bl_translation_context = OWN_CONTEXT
 
 
 def labelled(layout: Any, owner: Any, name: str, label_share: float = LABEL_SHARE) -> None:
     """A property with its label beside it: a plain menu in a narrow sidebar cuts its label off."""
     split = layout.split(factor=label_share)
-    split.label(text=owner.bl_rna.properties[name].name)
+    split.label(text=told(owner.bl_rna.properties[name].name))
     split.prop(owner, name, text="")
 
 
@@ -35,8 +38,8 @@ def hint(layout: Any, context: Any, sentence: str | None) -> None:
 
 
 def wrapped(layout: Any, context: Any, sentence: str, icon: str) -> None:
-    """A sentence broken to the width of the sidebar, with an icon before its first line."""
+    """A sentence, translated, broken to the width of the sidebar, with an icon before its first line."""
     width = context.region.width / (context.preferences.system.ui_scale * PIXELS_PER_CHARACTER)
-    lines = textwrap.wrap(sentence, max(int(width) - ICON_CHARACTERS, LEAST_CHARACTERS))
+    lines = textwrap.wrap(told(sentence), max(int(width) - ICON_CHARACTERS, LEAST_CHARACTERS))
     for number, line in enumerate(lines):
-        layout.label(text=line, icon=icon if number == 0 else "BLANK1")
+        layout.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)

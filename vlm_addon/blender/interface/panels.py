@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ...core.spans import numbers_in, parse_spans
 from .. import authoring
 from ..baking import bake_state
 from ..drawing.draw_tool import TOOLS, tool_name
@@ -18,6 +19,7 @@ from ..tagging import light_tags
 from . import availability, workflow
 from .panel_layout import SidebarPanel, hint, labelled, wrapped
 from .setting_presets import VLM_PT_presets
+from .translation import told_finding
 from .workflow import Step
 
 FINDINGS_SHOWN = 8
@@ -153,7 +155,8 @@ class VLM_PT_check(SidebarPanel, bpy.types.Panel):  # noqa: N801
 
     def _finding(self, context: Any, index: int, finding: Any) -> None:
         box = self.layout.box().column(align=True)
-        wrapped(box, context, finding.text, "ERROR")
+        count = sum(len(numbers_in(parse_spans(mark.faces, "face", 0))) for mark in finding.marks)
+        wrapped(box, context, told_finding(finding.kind, finding.text, count), "ERROR")
         row = box.row(align=True)
         if len(finding.marks):
             row.operator("vlm.select_offenders", text="Select", icon="RESTRICT_SELECT_OFF").index = index

@@ -14,6 +14,7 @@ from bpy.app.handlers import persistent
 
 from ...core.grid_samples import GridView
 from ...core.light_grid import FEW_LIGHTS, TOLERANCE
+from ..interface.translation import OWN_CONTEXT
 from ..light_meshes import light_meshes
 from .overlay_drawing import OverlayDrawing, reach_of
 from .overlay_shapes import COLOR, EMISSION, MOST_HALF_BALLS, NONE, TAGS
@@ -60,7 +61,12 @@ class VLM_PG_overlay(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming o
         options={"SKIP_SAVE"},
     )
     fill: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Fill", description="What the faces of lights show", items=FILLS, default=COLOR, update=_redraw
+        name="Fill",
+        description="What the faces of lights show",
+        items=FILLS,
+        default=COLOR,
+        update=_redraw,
+        translation_context=OWN_CONTEXT,
     )
     sides: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Shining Side",

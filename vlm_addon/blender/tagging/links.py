@@ -40,6 +40,12 @@ class Linked:
     more_receivers: int
 
 
+def receiver_names(context: Any, text: str) -> list[str]:
+    """Names, in order, of the visible objects that hold `text` in them: what an artist may let lights leave out."""
+    names = (each.name for each in context.scene.objects if has_geometry(each))
+    return sorted(name for name in names if text.casefold() in name.casefold())
+
+
 def named_receivers(context: Any, name: str) -> list[Any]:
     """The object of that name, or all selected visible objects where the name is empty. Raises InvalidInput."""
     if not name:
