@@ -7,10 +7,12 @@ import pytest
 
 from vlm_addon.bake import BakeSettings
 from vlm_addon.blender import authoring, checking
+from vlm_addon.blender.drawing import draw_lights
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.findings import fixable_kinds, marked_faces, select_offenders
 from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import read_faces, write_faces
+from vlm_addon.blender.light_meshes import light_meshes
 from vlm_addon.blender.light_repair import kinds_to_fix, work_after, work_on, write_fixed
 from vlm_addon.core import finding_kinds as kinds
 from vlm_addon.core.errors import InvalidInput
@@ -98,6 +100,41 @@ def test_a_light_in_front_is_pushed_behind_with_its_power(cube_lights):
     places = np.array([cube_lights.matrix_world @ vertex.co for vertex in cube_lights.data.vertices])
     assert np.abs(places).max() < 1.0
     assert area_times_scale(cube_lights) == pytest.approx(1.05**2 * power, rel=1e-5)
+
+
+def test_a_quad_above_one_large_face_comes_down_flat(make_plane):
+    """Two triangles of floor under two of light: each light has its own part of both."""
+    make_plane("floor", size=4.0)
+    bpy.context.view_layer.update()
+    points, normal = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0.0, 0.0, 1.0]])
+    draw_lights.draw(bpy.context, points, [[0, 1, 2, 3]], normal, 0.0)
+    thing = bpy.data.objects["VLM Drawn"]
+    for vertex in thing.data.vertices:
+        vertex.co.z += 0.1
+    assert check() == [kinds.IN_FRONT]
+    assert fix() == ["Moved 2 lights behind the surface"]
+    heights = [(thing.matrix_world @ vertex.co).z for vertex in thing.data.vertices]
+    assert len(set(heights)) == 1
+    assert -1e-5 < heights[0] < 0.0
+    assert not read_faces(thing, "vlm_tag").any()
+    assert check() == []
+
+
+def test_lights_of_a_room_that_stand_far_in_front_take_one_press(sample_folder):
+    bpy.ops.wm.open_mainfile(filepath=str(sample_folder / "cornell_box.blend"))
+    for thing in light_meshes(bpy.context.scene):
+        bpy.data.objects.remove(thing)
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings(target_triangles=60))(silent))
+    (thing,) = light_meshes(bpy.context.scene)
+    inwards = [0.1 * vertex.normal for vertex in thing.data.vertices]
+    for vertex, way in zip(thing.data.vertices, inwards, strict=True):
+        vertex.co += way
+    assert kinds.IN_FRONT in check()
+    fix(kinds.IN_FRONT)
+    assert kinds.IN_FRONT not in check()
+    before = [vertex.co.copy() for vertex in thing.data.vertices]
+    assert fix(kinds.IN_FRONT) == ["nothing is in front any more"]
+    assert [vertex.co for vertex in thing.data.vertices] == before
 
 
 def area_times_scale(thing):

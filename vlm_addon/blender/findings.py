@@ -126,7 +126,8 @@ def select_offenders(context: Any, index: int) -> int:
 def _edit(context: Any, things: list[Any]) -> None:
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-    for thing in context.view_layer.objects:
+    # None for what a script has deleted just now
+    for thing in filter(None, context.view_layer.objects):
         thing.select_set(thing in things)
     context.view_layer.objects.active = things[0]
     bpy.ops.object.mode_set(mode="EDIT")

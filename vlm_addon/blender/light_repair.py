@@ -84,10 +84,19 @@ def work_on(context: Any, kind: str) -> Callable[[Progress], Fixed]:
 
     def work(progress: Progress) -> Repaired:
         rows = _rows(kind, light_mesh, found.snapshot.meshes)
-        repair = fix(kind, light_mesh, found.snapshot.meshes, rows) if len(rows) else None
+        repair = None
+        if len(rows):
+            repair = fix(kind, light_mesh, found.snapshot.meshes, rows, polygon_of_light=_polygons(origins))
         return Repaired(kind, rows, light_mesh, origins, repair)
 
     return work
+
+
+def _polygons(origins: LightOrigins) -> Int64:
+    """(n,) a number of the face that each light is part of; lights that modifiers made are by themselves."""
+    faces = origins.faces.astype(np.int64)
+    stored = origins.owner * (int(faces.max(initial=0)) + 1) + faces
+    return np.where(faces >= 0, stored, -1 - np.arange(len(faces)))
 
 
 def _rows(kind: str, light_mesh: VirtualLightMesh, meshes: Any) -> Int64:

@@ -16,17 +16,23 @@ import numpy.typing as npt
 from . import finding_kinds as kinds
 from .errors import InvalidInput
 from .light_mesh import VirtualLightMesh
+from .light_regions import facing, pushing_regions
 from .mesh_topology import Bool, Int64, Rows, rows_by_key
 from .nearest_lights import pair_nearest
 from .own_tags import tagged_regions
-from .placement import insets, intrusions, place_behind
+from .placement import STEEPEST_COSINE, insets, intrusions, place_behind
+from .plates import find_plates, plates_behind
 from .scene import UNTAGGED, Float32, Float64, Int32, Mesh
+from .triangle_tree import build_tree
+from .validate import NOTICEABLE_DEPTH, check_light_mesh
 from .withdrawal import own_shares
 
 # The most of the light that arrives that a surface can send back.
 BRIGHTEST = 1.0
 # Points of each region at which its own light tells whether a move has made it worse.
 JUDGED_POINTS = 32
+# A push moves vertices by a share of their lights' size; lights that stand far in front take several.
+MOST_PUSHES = 8
 
 
 def _no_rows() -> Int64:
@@ -86,6 +92,7 @@ class _Work:
     chosen: Bool
     light_of_triangle: tuple[Int32, ...] | None
     face_of_triangle: Sequence[npt.ArrayLike] | None
+    polygon_of_light: npt.ArrayLike | None
 
     @property
     def rows(self) -> Int64:
@@ -96,6 +103,12 @@ class _Work:
         if self.light_of_triangle is not None:
             return self.light_of_triangle
         return pair_nearest(self.light_mesh, self.meshes)
+
+    def polygons(self) -> Int64:
+        """(n,) the polygon of each light."""
+        if self.polygon_of_light is None:
+            return np.arange(len(self.light_mesh))
+        return np.asarray(self.polygon_of_light, np.int64)
 
     def tagged(self, rows: Int64) -> tuple[Int32, tuple[Int32, ...], Int32]:
         """Tags of lights and triangles, and links, with which the regions of `rows` leave out their lights."""
@@ -114,13 +127,15 @@ def fix(
     rows: npt.ArrayLike,
     light_of_triangle: tuple[Int32, ...] | None = None,
     face_of_triangle: Sequence[npt.ArrayLike] | None = None,
+    polygon_of_light: npt.ArrayLike | None = None,
 ) -> Repair:
     """The repair of a finding of `kind` (finding_kinds.py) on the lights `rows`.
 
     meshes: the visible surface. light_of_triangle: for each of them, the light of each triangle; by default the
     nearest. face_of_triangle: for each of them, (its triangles,) the face that each triangle is part of, since one face
-    carries one tag; every triangle by itself by default. Raises InvalidInput for a kind that has no repair, or rows
-    that there are not.
+    carries one tag; every triangle by itself by default. polygon_of_light: (n,) a number of the polygon that each light
+    is part of, which stays flat where it moves; every light by itself by default. Raises InvalidInput for a kind that
+    has no repair, or rows that there are not.
     """
     if kind not in _REPAIRS:
         raise InvalidInput(f"finding {kind!r}", "there is no repair for it", "select the lights and mend them by hand")
@@ -130,7 +145,7 @@ def fix(
         raise InvalidInput(f"finding {kind!r}", problem, "check the light mesh again")
     chosen = np.zeros(len(light_mesh), bool)
     chosen[found] = True
-    return _REPAIRS[kind](_Work(light_mesh, meshes, chosen, light_of_triangle, face_of_triangle))
+    return _REPAIRS[kind](_Work(light_mesh, meshes, chosen, light_of_triangle, face_of_triangle, polygon_of_light))
 
 
 def _flipped(work: _Work) -> Repair:
@@ -191,28 +206,69 @@ def _behind(work: _Work) -> Repair:
     """Moved behind the surface; strength keeps the power where areas change. What is too thin gets tags."""
     mesh = work.light_mesh
     corners = _source_corners(work.meshes)
-    regions = _rows_of(work.regions(), len(mesh))
-    triangles = mesh.triangles.astype(np.int64)
+    nearest = _only(_rows_of(work.regions(), len(mesh)), work.chosen)
     # Only what the chosen lights stand for pushes: the others stay, but for the vertices that they share.
-    pushing = _only(regions, work.chosen)
-    placed = place_behind(mesh.vertices, triangles, pushing, corners)
-    before, after = (
-        own_shares(positions[triangles], pushing, corners, JUDGED_POINTS)
-        for positions in (mesh.vertices, placed.positions)
-    )
-    if (after > before).any():
-        # A light may stand in front of a part of its region that it does not shine on, and do so where it is pushed.
-        placed = place_behind(mesh.vertices, triangles, _only(regions, work.chosen & (after <= before)), corners)
-    moved = replace(mesh, vertices=placed.positions)
-    ratio = mesh.areas / np.where(moved.areas > 0, moved.areas, 1.0)
-    strength = (mesh.strength * np.where(moved.areas > 0, ratio, 1.0)).astype(np.float32)
-    repair = Repair(f"Moved {_lights(len(work.rows))} behind the surface", vertices=placed.positions, strength=strength)
-    left = work.chosen & (intrusions(moved.corners, pushing, corners) > insets(moved.corners))
+    corners, pushing = pushing_regions(mesh, nearest, corners, build_tree(corners))
+    pushing = _only(pushing, work.chosen)
+    vertices = _moved_behind(work, pushing, corners)
+    moved = replace(mesh, vertices=vertices)
+    strength = (mesh.strength * _area_ratios(mesh.areas, moved.areas, work.polygons())).astype(np.float32)
+    count = int(work.chosen[(vertices[mesh.triangles] != mesh.corners).any(axis=(1, 2))].sum())
+    repair = Repair(f"Moved {_lights(count)} behind the surface", vertices=vertices, strength=strength)
+    left = work.chosen & _still_in_front(moved, pushing, corners)
     if not left.any():
         return repair
     tags, triangle_tags, links = work.tagged(np.flatnonzero(left))
     sentence = f"{repair.sentence}; tagged {_lights(int(left.sum()))} for which the body is too thin"
     return replace(repair, sentence=sentence, tag_ids=tags, triangle_tags=triangle_tags, links=links)
+
+
+def _moved_behind(work: _Work, pushing: Rows, corners: Float64) -> Float64:
+    """(v, 3) m: polygons of several lights go back as a whole, single triangles as in creation, until none can."""
+    mesh = work.light_mesh
+    triangles = mesh.triangles.astype(np.int64)
+    plates = find_plates(mesh.vertices, triangles, work.polygons())
+    in_plate = plates.of_light >= 0
+    whole = _only(pushing, in_plate)
+    vertices, held = plates_behind(mesh.vertices, triangles, plates, whole, corners, build_tree(corners))
+    single = _only(pushing, ~in_plate)
+    for _ in range(MOST_PUSHES):
+        pushed = _pushed(vertices, triangles, single, corners)
+        pushed[held] = vertices[held]
+        if (pushed == vertices).all():
+            break
+        vertices = pushed
+    return vertices
+
+
+def _pushed(vertices: Float64, triangles: Int64, pushing: Rows, corners: Float64) -> Float64:
+    """(v, 3) m: one push, without what makes own light worse."""
+    placed = place_behind(vertices, triangles, pushing, corners)
+    before, after = (
+        own_shares(positions[triangles], pushing, corners, JUDGED_POINTS) for positions in (vertices, placed.positions)
+    )
+    if not (after > before).any():
+        return placed.positions
+    # A light may stand in front of a part of its region that it does not shine on, and do so where it is pushed.
+    return place_behind(vertices, triangles, _only(pushing, after <= before), corners).positions
+
+
+def _area_ratios(before: Float64, after: Float64, polygons: Int64) -> Float64:
+    """(n,) factor that makes up for the area that the polygon of each light has lost."""
+    number = np.unique(polygons, return_inverse=True)[1]
+    whole = [np.bincount(number, weights=areas)[number] for areas in (before, after)]
+    return np.divide(whole[0], whole[1], out=np.ones(len(number)), where=whole[1] > 0.0)
+
+
+def _still_in_front(light_mesh: VirtualLightMesh, regions: Rows, corners: Float64) -> Bool:
+    """(n,) lights in front of what pushes them, or that the check would find in front of their samples."""
+    lights = light_mesh.corners
+    noticeable = np.maximum(NOTICEABLE_DEPTH * np.sqrt(light_mesh.areas), insets(lights))
+    found: Bool = intrusions(lights, facing(corners, regions, lights, STEEPEST_COSINE), corners) > noticeable
+    for finding in check_light_mesh(light_mesh):
+        if finding.kind == kinds.IN_FRONT:
+            found[list(finding.lights)] = True
+    return found
 
 
 def _source_corners(meshes: Sequence[Mesh]) -> Float64:

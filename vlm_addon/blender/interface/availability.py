@@ -142,5 +142,8 @@ def light_scene_problem(context: bpy.types.Context) -> str | None:
 
 
 def rendered_objects(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
-    """The objects of the view layer that are enabled for renders."""
-    return (thing for thing in context.view_layer.objects if not thing.hide_render)
+    """The objects of the view layer that are enabled for renders.
+
+    A layer that has yet to hear that objects were deleted lists None for them.
+    """
+    return (thing for thing in context.view_layer.objects if thing is not None and not thing.hide_render)
