@@ -16,7 +16,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh_topology import Bool, Int64, closed_shells, cut_to_manifold, half_edges, sum_by
+from .corner_arrays import middles
+from .mesh_topology import (
+    Bool,
+    Int64,
+    cut_to_manifold,
+    fans_apart,
+    half_edges,
+    joined_shells,
+    sorted_with_order,
+    sum_by,
+    used_only,
+)
 from .morton import morton_codes
 from .scene import Float64
 
@@ -68,11 +79,11 @@ def reduce_groups(
     for members, budget in _shares(group, weight, target):
         report(done / len(triangles))
         done += len(members)
-        part = reduce_roughly(points, apart[members], budget)
+        used, local = used_only(apart[members], len(points))
+        part = reduce_roughly(points[used], local, budget)
         kept[members] = False
         kept[members[part.source_triangle]] = True
-        changed = np.unique(apart[members])
-        points[changed], vertex_map[changed] = part.positions[changed], part.vertex_map[changed]
+        points[used], vertex_map[used] = part.positions, used[part.vertex_map]
     moved = positions.copy()
     moved[origin] = points
     whole_map = np.arange(len(positions))
@@ -87,7 +98,7 @@ def _in_blocks(positions: Float64, triangles: Int64, group: Int64) -> Int64:
     size = np.bincount(group)
     if size.max(initial=0) <= LARGEST_RUN:
         return group
-    order = np.lexsort([morton_codes(positions[triangles].mean(axis=1)), group])
+    order = np.lexsort([morton_codes(middles(positions.take(triangles, axis=0))), group])
     place = np.arange(len(group)) - np.concatenate([[0], np.cumsum(size)])[group[order]]
     blocks = -(-size // LARGEST_RUN)
     block = place * blocks[group[order]] // np.maximum(size[group[order]], 1)
@@ -102,8 +113,11 @@ def _cut_between_groups(triangles: Int64, group: Int64, vertex_count: int) -> tu
     Both copies of a doubled vertex lie on a border and are never moved, so they can be put together again.
     """
     key = np.repeat(group, 3) * np.int64(vertex_count) + triangles.ravel()
-    unique, cut = np.unique(key, return_inverse=True)
-    return cut.reshape(-1, 3), unique % vertex_count
+    ascending, order = sorted_with_order(key, int(group.max(initial=0) + 1) * vertex_count)
+    begins = np.concatenate([[True], ascending[1:] != ascending[:-1]])
+    cut = np.empty(len(key), np.int64)
+    cut[order] = np.cumsum(begins) - 1
+    return cut.reshape(-1, 3), ascending[begins] % vertex_count
 
 
 def _shares(group: Int64, weight: Float64, target: int) -> list[tuple[Int64, int]]:
@@ -113,7 +127,7 @@ def _shares(group: Int64, weight: Float64, target: int) -> list[tuple[Int64, int
     budget = target * 0.5 * (power + size / max(len(group), 1))
     reducible = (size > 0) & (budget < WORTHWHILE * size)
     large = reducible & (size >= LARGE_GROUP)
-    order = np.argsort(group, kind="stable")
+    _, order = sorted_with_order(group, len(size))
     ends = np.cumsum(size)
     runs = [(order[ends[g] - size[g] : ends[g]], max(int(budget[g]), LEAST_BUDGET)) for g in np.flatnonzero(large)]
     small = reducible & ~large
@@ -128,7 +142,7 @@ def reduce_roughly(positions: Float64, triangles: Int64, target: int) -> Reduced
     positions: (v, 3). triangles: (t, 3) use some of them. Triangles around faults are kept out of the next attempt;
     after ATTEMPTS faulty results the input is returned.
     """
-    shell, _ = closed_shells(triangles, len(positions))
+    source = _Topology.of(triangles, len(positions))
     frozen = np.zeros(len(triangles), bool)
     for _ in range(ATTEMPTS):
         if frozen.sum() > 0.5 * target:
@@ -139,18 +153,32 @@ def reduce_roughly(positions: Float64, triangles: Int64, target: int) -> Reduced
         if budget >= loose.sum():
             break
         reduced = _run(positions, triangles, loose, budget)
-        fault = _faults(reduced, triangles, positions)[reduced.vertex_map[triangles]].any(axis=1)
-        lost = np.bincount(shell[reduced.source_triangle], minlength=int(shell.max()) + 1) == 0
-        fault |= lost[shell]
+        fault = _faults(reduced, triangles, source)[reduced.vertex_map[triangles]].any(axis=1)
+        lost = np.bincount(source.shell[reduced.source_triangle], minlength=int(source.shell.max()) + 1) == 0
+        fault |= lost[source.shell]
         if not fault.any():
             return reduced
         frozen |= fault
     return Reduced(positions, triangles, np.arange(len(triangles)), np.arange(len(positions)))
 
 
+@dataclass(frozen=True)
+class _Topology:
+    """Of the triangles before a reduction. shell: (t,) int64. border: (v,) bool, vertices on it."""
+
+    shell: Int64
+    border: Bool
+
+    @staticmethod
+    def of(triangles: Int64, vertex_count: int) -> _Topology:
+        edges = half_edges(triangles, vertex_count)
+        border = np.zeros(vertex_count, bool)
+        border[triangles.ravel()[edges.twin < 0]] = True
+        return _Topology(joined_shells(edges)[0], border)
+
+
 def _run(positions: Float64, triangles: Int64, loose: Bool, budget: int) -> Reduced:
-    used, local = np.unique(triangles[loose], return_inverse=True)
-    local = local.reshape(-1, 3)
+    used, local = used_only(triangles[loose], len(positions))
     points, collapses = _simplify(positions[used], local, budget)
     merged = np.arange(len(used))
     merged[collapses[:, 1]] = collapses[:, 0]
@@ -163,8 +191,10 @@ def _run(positions: Float64, triangles: Int64, loose: Bool, budget: int) -> Redu
     keep = np.flatnonzero((a != b) & (b != c) & (c != a))
     moved = positions.copy()
     # The library numbers the vertices of its result in the order of those that still have a triangle.
-    left = np.unique(merged[local][_distinct(merged[local])])
-    touched = np.isin(left, collapses)
+    left = used_only(merged[local][_distinct(merged[local])], len(used))[0]
+    touched = np.zeros(len(used), bool)
+    touched[collapses] = True
+    touched = touched[left]
     moved[used[left[touched]]] = points[touched]
     return Reduced(moved, mapped[keep], keep, vertex_map)
 
@@ -178,7 +208,8 @@ def _simplify(points: Float64, triangles: Int64, budget: int) -> tuple[Float64, 
     import fast_simplification
 
     # Its error threshold grows from 2e-6 in units of length squared: with the mean edge at one, from small errors on.
-    edges = points[triangles] - points[np.roll(triangles, -1, axis=1)]
+    corners = points.take(triangles, axis=0)
+    edges = corners - np.roll(corners, -1, axis=1)
     scale = max(float(np.linalg.norm(edges, axis=2).mean()), float(np.finfo(float).tiny))
     centre = points.mean(axis=0)
     with _one_at_a_time:
@@ -192,22 +223,20 @@ def _simplify(points: Float64, triangles: Int64, budget: int) -> tuple[Float64, 
     return result * scale + centre, np.asarray(collapses, np.int64).reshape(-1, 2)
 
 
-def _faults(reduced: Reduced, triangles: Int64, positions: Float64) -> Bool:
+def _faults(reduced: Reduced, triangles: Int64, source: _Topology) -> Bool:
     """(v,): vertices where the result has another topology than a manifold with the old border, or is not finite."""
-    count = len(positions)
-    fault = np.zeros(count, bool)
-    fault |= ~np.isfinite(reduced.positions).all(axis=1)
-    border = np.zeros(count, bool)
-    before = half_edges(triangles, count)
-    border[triangles.ravel()[before.twin < 0]] = True
+    count = len(source.border)
+    fault: Bool = ~np.isfinite(reduced.positions).all(axis=1)
     after = half_edges(reduced.triangles, count)
     start, end = reduced.triangles.ravel(), np.roll(reduced.triangles, -1, axis=1).ravel()
-    opened = (after.twin < 0) & ~(border[start] & border[end])
+    opened = (after.twin < 0) & ~(source.border[start] & source.border[end])
     opened |= after.face_count[after.edge] > 2
     fault[start[opened]] = fault[end[opened]] = True
-    return fault | (_fans(reduced.triangles, count) > np.maximum(_fans(triangles, count), 1))
-
-
-def _fans(triangles: Int64, vertex_count: int) -> Int64:
-    """(v,): pieces into which the triangles around each vertex fall."""
-    return np.bincount(cut_to_manifold(triangles, vertex_count)[1], minlength=vertex_count)
+    fans = np.bincount(fans_apart(reduced.triangles, after)[1], minlength=count)
+    several = fans > 1
+    if several.any():
+        # Triangles around a vertex are all that its fans depend on.
+        around = several[triangles].any(axis=1)
+        before = np.bincount(cut_to_manifold(triangles[around], count)[1], minlength=count)
+        fault |= several & (fans > before)
+    return fault

@@ -56,9 +56,33 @@ class Rows:
 
 def rows_by_key(keys: Int64, row_count: int, values: Int64 | None = None) -> Rows:
     """The `values` (default: their positions) gathered by key, in their order within a key."""
-    order = np.argsort(keys, kind="stable")
+    _, order = sorted_with_order(keys, row_count)
     starts = np.concatenate([[0], np.cumsum(np.bincount(keys, minlength=row_count))])
     return Rows(order if values is None else values[order], starts)
+
+
+def sorted_with_order(keys: Int64, bound: int) -> tuple[Int64, Int64]:
+    """(keys ascending, where each was), equal ones in their order. keys: from 0 to bound - 1.
+
+    Where key and place fit into one number together, that is sorted: a few times as fast as NumPy's stable order.
+    """
+    bits = len(keys).bit_length()
+    if bound.bit_length() + bits < 63:
+        packed = np.sort((keys.astype(np.int64) << bits) | np.arange(len(keys)))
+        return packed >> bits, packed & ((1 << bits) - 1)
+    order = np.argsort(keys)
+    ascending = keys[order]
+    # Equal keys stand in any order yet: sorted by place within each run of them.
+    run = np.cumsum(np.concatenate([[0], ascending[1:] != ascending[:-1]]))[: len(keys)]
+    return ascending, np.sort((run << bits) | order) & ((1 << bits) - 1)
+
+
+def used_only(triangles: Int64, vertex_count: int) -> tuple[Int64, Int64]:
+    """(vertices that triangles use, ascending, the triangles in numbers of these)."""
+    used = np.zeros(vertex_count, bool)
+    used[triangles] = True
+    number = np.cumsum(used) - 1
+    return np.flatnonzero(used), number[triangles]
 
 
 def sum_by(index: Int64, values: Float64, count: int) -> Float64:
@@ -77,8 +101,7 @@ def half_edges(triangles: Int64, vertex_count: int) -> HalfEdges:
     start = triangles.ravel()
     end = np.roll(triangles, -1, axis=1).ravel()
     key = np.minimum(start, end) * np.int64(max(vertex_count, 1)) + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
-    sorted_key = key[order]
+    sorted_key, order = sorted_with_order(key, max(vertex_count, 1) ** 2)
     first = np.flatnonzero(np.concatenate([[True], sorted_key[1:] != sorted_key[:-1]])) if len(key) else order
     face_count = np.diff(np.append(first, len(key)))
     edge = np.empty(len(key), np.int64)
@@ -113,8 +136,9 @@ def connected_components(count: int, one: Int64, other: Int64) -> tuple[int, Int
             if (halved == root).all():
                 break
             root = halved
-    unique, labels = np.unique(root, return_inverse=True)
-    return len(unique), labels
+    # Each root is the smallest of its component.
+    is_root = root == np.arange(count)
+    return int(is_root.sum()), (np.cumsum(is_root) - 1)[root]
 
 
 def weld(positions: Float64, owner: Int64) -> Int64:
@@ -167,7 +191,11 @@ def cut_to_manifold(triangles: Int64, vertex_count: int) -> tuple[Int64, Int64]:
     Fans are joined across edges that exactly two triangles of one orientation share, so the result is an oriented
     manifold with border. origin: (new vertices,) the vertex each one was.
     """
-    edges = half_edges(triangles, vertex_count)
+    return fans_apart(triangles, half_edges(triangles, vertex_count))
+
+
+def fans_apart(triangles: Int64, edges: HalfEdges) -> tuple[Int64, Int64]:
+    """`cut_to_manifold` of triangles whose edges are known."""
     one = np.flatnonzero(edges.twin > np.arange(len(edges.twin)))
     other = edges.twin[one]
     after_one, after_other = one - one % 3 + (one + 1) % 3, other - other % 3 + (other + 1) % 3
@@ -184,9 +212,14 @@ def closed_shells(triangles: Int64, vertex_count: int) -> tuple[Int64, Bool]:
 
     Shells are joined across edges with two triangles of one orientation.
     """
-    edges = half_edges(triangles, vertex_count)
-    open_faces = (edges.twin < 0).reshape(-1, 3).any(axis=1)
-    return shells_of(edges, len(triangles), open_faces)
+    return joined_shells(half_edges(triangles, vertex_count))
+
+
+def joined_shells(edges: HalfEdges) -> tuple[Int64, Bool]:
+    """`closed_shells` of triangles whose edges are known."""
+    is_open = edges.twin < 0
+    open_faces: Bool = is_open[0::3] | is_open[1::3] | is_open[2::3]
+    return shells_of(edges, len(open_faces), open_faces)
 
 
 def shells_of(edges: HalfEdges, triangle_count: int, open_faces: Bool) -> tuple[Int64, Bool]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .bulk_reduction import Reduced, reduce_groups
 from .edge_collapse import CollapsedMesh, collapse_edges
-from .mesh_topology import Bool, Int64
+from .mesh_topology import Bool, Int64, normals_and_areas, used_only
 from .scene import Float64
 from .source_surface import SourceSurface
 
@@ -73,8 +73,7 @@ def reduce_surface(
         )
         begun = ROUGH_TIME
     left = rows[start.source_triangle]
-    used, triangles = np.unique(start.triangles, return_inverse=True)
-    triangles = triangles.reshape(-1, 3)
+    used, triangles = used_only(start.triangles, len(surface.positions))
     centre, size = surface.positions[used].mean(axis=0), surface.diagonal
     positions = (start.positions[used] - centre) / size
     power = weight[left] * _areas(positions, triangles)
@@ -109,10 +108,10 @@ def _alike(surface: SourceSurface) -> Int64:
 
 def _selected(surface: SourceSurface, chosen: Bool) -> ReducedSurface:
     rows = np.flatnonzero(chosen)
-    used, triangles = np.unique(surface.triangles[rows], return_inverse=True)
+    used, triangles = used_only(surface.triangles[rows], len(surface.positions))
     number = np.full(len(surface.positions), -1, np.int64)
     number[used] = np.arange(len(used))
-    return ReducedSurface(surface.positions[used], triangles.reshape(-1, 3), rows, number, False)
+    return ReducedSurface(surface.positions[used], triangles, rows, number, False)
 
 
 def _strongest_shells(surface: SourceSurface, solid: Bool, target: int) -> Bool:
@@ -149,12 +148,12 @@ def _within_budget(collapsed: CollapsedMesh, surface: SourceSurface, left: Int64
         keep[np.argsort(-area, kind="stable")[:target]] = True
     if keep.all():
         return collapsed
-    used, triangles = np.unique(collapsed.triangles[keep], return_inverse=True)
+    used, triangles = used_only(collapsed.triangles[keep], len(collapsed.positions))
     number = np.full(len(collapsed.positions), -1, np.int64)
     number[used] = np.arange(len(used))
     return CollapsedMesh(
         positions=collapsed.positions[used],
-        triangles=triangles.reshape(-1, 3),
+        triangles=triangles,
         source_triangle=collapsed.source_triangle[keep],
         vertex_map=np.where(collapsed.vertex_map >= 0, number[collapsed.vertex_map], -1),
         merged_borders=collapsed.merged_borders,
@@ -162,5 +161,4 @@ def _within_budget(collapsed: CollapsedMesh, surface: SourceSurface, left: Int64
 
 
 def _areas(positions: Float64, triangles: Int64) -> Float64:
-    a, b, c = np.moveaxis(positions[triangles], 1, 0)
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return normals_and_areas(positions.take(triangles, axis=0))[1]

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh_topology import Bool, Int64, Rows, rows_by_key, sum_by, vertex_faces
+from .corner_arrays import middles
+from .mesh_topology import Bool, Int64, Rows, normals_and_areas, rows_by_key, sum_by, vertex_faces
 from .morton import morton_codes
+from .parallel import side_by_side, slices
 from .reduce_surface import ReducedSurface
 from .scene import Float64
 from .source_surface import SourceSurface
@@ -24,8 +26,8 @@ from .source_surface import SourceSurface
 ADOPTION_WINDOW = 8
 # A light that would shine on what it stands for counts as so many times as far, squared.
 SHONE_ON = 16.0
-# Some ten candidates each.
-ROWS_PER_BATCH = 1 << 16
+# Some ten candidates each, which fit into a cache.
+ROWS_PER_BATCH = 1 << 13
 
 
 @dataclass(frozen=True)
@@ -48,14 +50,18 @@ def assign_regions(
     lights = _Lights(positions[triangles], surface.group[source_triangle])
     alike = np.einsum("ij,ij->i", surface.normals[source_triangle], lights.normals) > 0
     light_of[source_triangle[alike]] = np.flatnonzero(alike)
-    merged = reduced.vertex_map[surface.triangles]
-    adopted = (merged < 0).any(axis=1)
+    merged = reduced.vertex_map.take(surface.triangles)
+    adopted = (merged[:, 0] < 0) | (merged[:, 1] < 0) | (merged[:, 2] < 0)
     around = vertex_faces(triangles, len(positions))
     open_rows = np.flatnonzero((light_of < 0) & ~adopted)
-    for first in range(0, len(open_rows), ROWS_PER_BATCH):
-        report(first / len(open_rows))
-        rows = open_rows[first : first + ROWS_PER_BATCH]
-        light_of[rows] = _nearest_around(surface, lights, rows, merged[rows], around)
+    batches = [open_rows[part] for part in slices(len(open_rows), ROWS_PER_BATCH)]
+
+    def nearest(rows: Int64) -> Int64:
+        return _nearest_around(surface, lights, rows, merged.take(rows, axis=0), around)
+
+    for number, (rows, found) in enumerate(zip(batches, side_by_side(nearest, batches), strict=True)):
+        light_of[rows] = found
+        report(number / len(batches))
     if adopted.any():
         light_of[adopted] = _adopt(surface, lights, source_triangle, np.flatnonzero(adopted))
     return Regions(light_of, adopted)
@@ -68,10 +74,7 @@ class _Lights:
         self.corners = corners
         self.group = group
         side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        normal = np.cross(side, other)
-        doubled = np.linalg.norm(normal, axis=1)
-        self.areas = 0.5 * doubled
-        self.normals = normal / np.where(doubled > 0, doubled, 1.0)[:, None]
+        self.normals, self.areas = normals_and_areas(corners)
         length = np.linalg.norm(side, axis=1)
         x_axis = side / np.where(length > 0, length, 1.0)[:, None]
         y_axis = np.cross(self.normals, x_axis)
@@ -79,21 +82,34 @@ class _Lights:
         zero = np.zeros(len(corners))
         flat_x = np.stack([zero, length, np.einsum("ij,ij->i", other, x_axis)], axis=1)
         flat_y = np.stack([zero, zero, np.einsum("ij,ij->i", other, y_axis)], axis=1)
-        self.flat = np.stack([flat_x, flat_y], axis=2)
+        flat = np.stack([flat_x, flat_y], axis=2)
+        sides = np.roll(flat, -1, axis=1) - flat
+        square = np.einsum("nck,nck->nc", sides, sides)
+        # One row for each quantity, which are gathered one by one: several times as fast as rows of a light.
+        self._origin, self._frame = corners[:, 0].T.copy(), self.frames.transpose(1, 2, 0).copy()
+        self._start, self._side = flat.transpose(1, 2, 0).copy(), sides.transpose(1, 2, 0).copy()
+        self._normal = self.normals.T.copy()
+        self._square = np.where(square > 0, square, 1.0).T.copy()
+
+    def cosines(self, normals: Float64, owner: Int64, light: Int64) -> Float64:
+        """(n,) cosine between row `owner` of unit normals (m, 3) and that of the light beside it."""
+        x, y, z = (
+            np.ascontiguousarray(normals[:, axis]).take(owner) * self._normal[axis].take(light) for axis in range(3)
+        )
+        cosine: Float64 = x + y + z
+        return cosine
 
     def squared_distances(self, points: Float64, light: Int64) -> Float64:
         """(n,) squared distance from each point (n, 3) to the light beside it, m²."""
-        offset = points - self.corners[light, 0]
-        x, y, height = np.einsum("ikj,ij->ki", self.frames[light], offset)
-        flat = self.flat[light]
+        offset = [points[:, axis] - self._origin[axis].take(light) for axis in range(3)]
+        x, y, height = (sum(row[axis].take(light) * offset[axis] for axis in range(3)) for row in self._frame)
         best = np.full(len(points), np.inf)
         inside = np.ones(len(points), bool)
-        for corner in range(3):
-            start_x, start_y = flat[:, corner].T
-            side_x, side_y = (flat[:, (corner + 1) % 3] - flat[:, corner]).T
-            dx, dy = x - start_x, y - start_y
-            square = side_x * side_x + side_y * side_y
-            along = np.clip((dx * side_x + dy * side_y) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+        for start, side, square in zip(self._start, self._side, self._square, strict=True):
+            side_x, side_y = side[0].take(light), side[1].take(light)
+            dx, dy = x - start[0].take(light), y - start[1].take(light)
+            along = (dx * side_x + dy * side_y) / square.take(light)
+            along = np.minimum(np.maximum(along, 0.0), 1.0)
             rest_x, rest_y = dx - along * side_x, dy - along * side_y
             best = np.minimum(best, rest_x * rest_x + rest_y * rest_y)
             inside &= side_x * dy - side_y * dx >= 0
@@ -113,12 +129,13 @@ def _nearest_around(surface: SourceSurface, lights: _Lights, rows: Int64, merged
     pairs = [around.expand(merged[part, corner]) for corner, part in enumerate(kept)]
     owner = np.concatenate([part[pair[0]] for part, pair in zip(kept, pairs, strict=True)])
     light = np.concatenate([pair[1] for pair in pairs])
-    centre = surface.positions[surface.triangles[rows]].mean(axis=1)
-    score = lights.squared_distances(centre[owner], light)
-    cosine = np.einsum("ij,ij->i", surface.normals[rows[owner]], lights.normals[light])
-    score += (1.0 - cosine) * lights.areas[light]
+    centre = middles(surface.positions.take(surface.triangles.take(rows, axis=0), axis=0))
+    score = lights.squared_distances(centre.take(owner, axis=0), light)
+    cosine = lights.cosines(surface.normals.take(rows, axis=0), owner, light)
+    score += (1.0 - cosine) * lights.areas.take(light)
     # Rather a light of another direction than one of another group, and rather any than none.
-    score += surface.diagonal**2 * ((cosine <= 0) + 2.0 * (surface.group[rows[owner]] != lights.group[light]))
+    strange = surface.group.take(rows).take(owner) != lights.group.take(light)
+    score += surface.diagonal**2 * ((cosine <= 0) + 2.0 * strange)
     return _least(score, owner, light, len(rows))
 
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .corner_arrays import middles
 from .light_mesh import SourceSamples
-from .mesh_topology import Int64, Rows
-from .morton import morton_codes
+from .mesh_topology import Int64, Rows, sorted_with_order
+from .morton import BITS_PER_AXIS, morton_codes
 from .scene import Float64
 
 MINIMUM_SAMPLES = 4
@@ -87,6 +88,10 @@ def sample_regions(corners: Float64, regions: Rows, counts: Int64) -> SourceSamp
 def _spatial_order(corners: Float64, regions: Rows) -> tuple[Int64, Int64]:
     """Members of the regions, each region along the Z-order curve, and the light of each member."""
     owner = np.repeat(np.arange(len(regions.starts) - 1), regions.lengths)
-    code = morton_codes(corners.mean(axis=1))[regions.values]
-    order = np.lexsort([code, owner])
-    return regions.values[order], owner
+    along = sorted_with_order(morton_codes(middles(corners)), 1 << 3 * BITS_PER_AXIS)[1]
+    rank = np.empty(len(along), np.int64)
+    rank[along] = np.arange(len(along))
+    bits = len(along).bit_length()
+    # Light and place on the curve in one number.
+    packed = np.sort((owner << bits) | rank[regions.values])
+    return along[packed & ((1 << bits) - 1)], owner

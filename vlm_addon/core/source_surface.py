@@ -5,11 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from .errors import InvalidInput
-from .mesh_topology import Bool, Int64, closed_shells, cut_to_manifold, weld
+from .mesh_topology import (
+    Bool,
+    HalfEdges,
+    Int64,
+    closed_shells,
+    fans_apart,
+    half_edges,
+    joined_shells,
+    normals_and_areas,
+    used_only,
+    weld,
+)
 from .scene import Float64, Mesh
 
 # Importance of a black surface against a white one: it needs no lights, but its shape must still collapse in order.
@@ -48,15 +60,15 @@ class SourceSurface:
     degenerate_count: int
     unlit_area: float
 
-    @property
+    @cached_property
     def corners(self) -> Float64:
         """(t, 3, 3) float64, m."""
-        return self.positions[self.triangles]
+        return self.positions.take(self.triangles, axis=0)
 
-    @property
+    @cached_property
     def diagonal(self) -> float:
         """Diagonal of the bounding box of all triangles, m; 0 for none."""
-        used = self.positions[np.unique(self.triangles)]
+        used = self.positions[used_only(self.triangles, len(self.positions))[0]]
         return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0))) if len(used) else 0.0
 
     def importance(self) -> Float64:
@@ -84,23 +96,25 @@ def join_surface(meshes: Sequence[Mesh], report: Callable[[float], None] = lambd
     mesh_of = np.repeat(np.arange(len(filled)), [len(mesh.triangles) for mesh in filled])
     positions, triangles = _concatenate(filled)
     owner = np.repeat(np.arange(len(filled)), [len(mesh.positions) for mesh in filled])
-    used, triangles = np.unique(triangles, return_inverse=True)
-    positions, triangles = positions[used], triangles.reshape(-1, 3)
-    report(0.2)
+    used, triangles = used_only(triangles, len(positions))
+    positions = positions[used]
+    report(0.1)
     welded = weld(positions, owner[used])[triangles]
     a, b, c = welded.T
     detail = np.concatenate([_detail(mesh) for mesh in filled]) if filled else np.zeros(0)
     unlit = triangles[detail <= 0]
     original = np.flatnonzero((a != b) & (b != c) & (c != a) & (detail > 0))
-    report(0.5)
-    cut, origin = cut_to_manifold(welded[original], len(positions))
-    sides = positions[unlit[:, 1:]] - positions[unlit[:, :1]]
-    unlit_area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
+    report(0.3)
+    edges = half_edges(welded[original], len(positions))
+    report(0.45)
+    cut, origin = fans_apart(welded[original], edges)
+    unlit_area = float(normals_and_areas(positions[unlit])[1].sum())
     positions, mesh_of = positions[origin], mesh_of[original]
-    normals = np.cross(positions[cut[:, 1]] - positions[cut[:, 0]], positions[cut[:, 2]] - positions[cut[:, 0]])
-    doubled = np.linalg.norm(normals, axis=1)
-    report(0.8)
-    shell, closed = closed_shells(cut, len(positions))
+    normals, areas = normals_and_areas(positions.take(cut, axis=0))
+    report(0.75)
+    # Where only twins meet at edges, cutting fans apart parts no edge.
+    shell, closed = joined_shells(edges) if _only_twins(edges) else closed_shells(cut, len(positions))
+    report(0.9)
     attributes = {name: _gather(filled, name)[original] for name in ("reflectance", "emission")}
     tag = _gather(filled, "tag_ids").astype(np.int64)[original]
     material = _gather(filled, "material_indices").astype(np.int64)[original]
@@ -113,16 +127,21 @@ def join_surface(meshes: Sequence[Mesh], report: Callable[[float], None] = lambd
         shell=shell,
         tag=tag,
         closed=closed,
-        areas=0.5 * doubled,
-        normals=normals / np.where(doubled > 0, doubled, 1.0)[:, None],
+        areas=areas,
+        normals=normals,
         reflectance=attributes["reflectance"].reshape(-1, 3).astype(np.float64),
         emission=attributes["emission"].reshape(-1, 3).astype(np.float64),
         dynamic=np.array([mesh.dynamic for mesh in filled], bool)[mesh_of],
         detail=detail[original],
         triangle_count=len(triangles),
-        degenerate_count=len(triangles) - len(unlit) - int((doubled > 0).sum()),
+        degenerate_count=len(triangles) - len(unlit) - int((areas > 0).sum()),
         unlit_area=unlit_area,
     )
+
+
+def _only_twins(edges: HalfEdges) -> bool:
+    """Whether each half-edge has a twin or its edge to itself."""
+    return bool(((edges.twin >= 0) | (edges.face_count[edges.edge] == 1)).all())
 
 
 def _detail(mesh: Mesh) -> Float64:

@@ -7,11 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh_topology import Bool, Int64
-from .morton import morton_codes
+from .corner_arrays import highest, lowest, middles
+from .mesh_topology import Bool, Int64, sorted_with_order
+from .morton import BITS_PER_AXIS, morton_codes
+from .parallel import side_by_side, slices
 from .scene import Float64
 
 LEAF_SIZE = 4
+# A class and a place on the curve fit into one number.
+MOST_CLASSES = 4
 # A segment that starts on a triangle meets it at 0 up to rounding.
 HIT_START = 1e-6
 # A segment through an edge meets at least one of its triangles, also with rounding.
@@ -55,15 +59,15 @@ class TriangleTree:
 
     def all_met(self, origins: Float64, ends: Float64) -> tuple[Int64, Int64]:
         """(segment, triangle), each (k,) int64: all triangles that each segment meets, from either side."""
-        segments, triangles = [], []
-        for first in range(0, len(origins), SEGMENTS_PER_BATCH):
-            rows = slice(first, first + SEGMENTS_PER_BATCH)
-            segment, triangle = _met_boxes(self, origins[rows], ends[rows])
-            corners = self.corners[triangle]
-            hit = np.isfinite(_intersections(corners, origins[rows][segment], ends[rows][segment], False))
-            segments.append(first + segment[hit])
-            triangles.append(triangle[hit])
+
+        def met(rows: slice) -> tuple[Int64, Int64]:
+            segment, triangle, fraction = _met(self, origins[rows], ends[rows], False)
+            hit = np.isfinite(fraction)
+            return rows.start + segment[hit], triangle[hit]
+
+        found = list(side_by_side(met, slices(len(origins), SEGMENTS_PER_BATCH)))
         none = np.zeros(0, np.int64)
+        segments, triangles = zip(*found, strict=True) if found else ((), ())
         return np.concatenate([none, *segments]), np.concatenate([none, *triangles])
 
 
@@ -72,23 +76,32 @@ def build_tree(corners: Float64) -> TriangleTree:
     count = len(corners)
     levels = max(0, int(np.ceil(np.log2(max(count, 1) / LEAF_SIZE)))) if count > LEAF_SIZE else 0
     order = np.full(LEAF_SIZE << levels, -1, np.int64)
-    order[:count] = np.lexsort([morton_codes(corners.mean(axis=1)), _size_classes(corners)])
-    filled = order >= 0
+    box_low, box_high = lowest(corners), highest(corners)
+    order[:count] = _spatial_order(corners, box_low, box_high)
     low = np.full((len(order), 3), np.inf)
     high = np.full((len(order), 3), -np.inf)
-    box_low, box_high = corners.min(axis=1), corners.max(axis=1)
-    low[filled], high[filled] = box_low[order[:count]], box_high[order[:count]]
-    lower, upper = [low.reshape(-1, LEAF_SIZE, 3).min(axis=1)], [high.reshape(-1, LEAF_SIZE, 3).max(axis=1)]
-    for _ in range(levels):
-        lower.insert(0, lower[0].reshape(-1, 2, 3).min(axis=1))
-        upper.insert(0, upper[0].reshape(-1, 2, 3).max(axis=1))
+    low[:count], high[:count] = box_low.take(order[:count], axis=0), box_high.take(order[:count], axis=0)
+    lower, upper = [low], [high]
+    for _ in range(int(np.log2(LEAF_SIZE)) + levels):
+        lower.insert(0, np.minimum(lower[0][0::2], lower[0][1::2]))
+        upper.insert(0, np.maximum(upper[0][0::2], upper[0][1::2]))
+    lower, upper = lower[: levels + 1], upper[: levels + 1]
     return TriangleTree(corners, order, tuple(lower), tuple(upper), box_low, box_high)
 
 
-def _size_classes(corners: Float64) -> Int64:
+def _spatial_order(corners: Float64, low: Float64, high: Float64) -> Int64:
+    """Triangles by size class, those of a class along the Z-order curve."""
+    classes, code = _size_classes(low, high), morton_codes(middles(corners))
+    most = int(classes.max(initial=0))
+    if most >= MOST_CLASSES:
+        return np.lexsort([code, classes])
+    return sorted_with_order((classes << 3 * BITS_PER_AXIS) | code, (most + 1) << 3 * BITS_PER_AXIS)[1]
+
+
+def _size_classes(low: Float64, high: Float64) -> Int64:
     """(t,): how many times each triangle is four times as large as the median. One wall would swell the boxes of all
     small triangles near its middle, so large ones get branches of their own."""
-    extent = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1) if len(corners) else np.zeros(0)
+    extent = highest(high - low)
     median = float(np.median(extent)) if len(extent) else 0.0
     ratio = extent / (median if median > 0 else 1.0)
     classes: Int64 = np.floor(0.5 * np.log2(np.maximum(ratio, 1.0))).astype(np.int64)
@@ -97,17 +110,25 @@ def _size_classes(corners: Float64) -> Int64:
 
 def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> tuple[Float64, Int64]:
     nearest, met = np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
-    for first in range(0, len(origins), SEGMENTS_PER_BATCH):
-        rows = slice(first, first + SEGMENTS_PER_BATCH)
-        segment, triangle = _met_boxes(tree, origins[rows], ends[rows])
-        corners = tree.corners[triangle]
-        fraction = _intersections(corners, origins[rows][segment], ends[rows][segment], from_behind)
+
+    def look(rows: slice) -> None:
+        segment, triangle, fraction = _met(tree, origins[rows], ends[rows], from_behind)
         hit = np.flatnonzero(np.isfinite(fraction))
         hit = hit[np.lexsort([fraction[hit], segment[hit]])]
         hit = hit[np.diff(segment[hit], prepend=-1) > 0]
         nearest[rows][segment[hit]] = fraction[hit]
         met[rows][segment[hit]] = triangle[hit]
+
+    for _ in side_by_side(look, slices(len(origins), SEGMENTS_PER_BATCH)):
+        pass
     return nearest, met
+
+
+def _met(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> tuple[Int64, Int64, Float64]:
+    """(segment, triangle, fraction) where segments meet boxes of triangles; inf where not the triangle itself."""
+    segment, triangle = _met_boxes(tree, origins, ends)
+    corners = tree.corners.take(triangle, axis=0)
+    return segment, triangle, _intersections(corners, origins[segment], ends[segment], from_behind)
 
 
 def _met_boxes(tree: TriangleTree, origins: Float64, ends: Float64) -> tuple[Int64, Int64]:
