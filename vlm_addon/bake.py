@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from .core.errors import InvalidInput
+from .core.exact_tags import tagged_by_map
 from .core.light_mesh import VirtualLightMesh, join, require_valid
 from .core.progress import Progress, silent
 from .core.scene import Finding, Int32, SceneSnapshot
 from .core.settings import OWN, setting
 from .core.simplify import SimplifyReport, SimplifySettings, create_light_mesh, subdivide_light_mesh
-from .core.tag_pairs import SurfaceFaces, tagged_by_map
+from .core.tag_pairs import SurfaceFaces
 from .core.validate import check_light_mesh
 
 
@@ -51,12 +52,13 @@ class BakeSettings(SimplifySettings):
 class Bake:
     """A validated light mesh. creation: how it was made, None where the scene had one already. findings: what the
     check, the creation and the extraction found, the check's first. face_tags: (f,) int32, new tags of the surface
-    where some were asked for."""
+    where some were asked for; paired_links: (p, 2) int32, the links of the light mesh that were made for these."""
 
     light_mesh: VirtualLightMesh
     creation: SimplifyReport | None
     findings: tuple[Finding, ...]
     face_tags: Int32 | None = None
+    paired_links: Int32 | None = None
 
     def report(self) -> dict[str, Any]:
         """The bake as JSON-able values: counts, powers in m² under unit irradiance, milliseconds, findings."""
@@ -97,7 +99,7 @@ def bake(
     scene shows no surface to make lights of, or `existing` holds values that are not finite or negative, for fewer
     lights than are kept, and for more links than there can be; Cancelled.
     """
-    creation, face_tags, meshes = None, None, snapshot.meshes
+    creation, face_tags, meshes, paired_links = None, None, snapshot.meshes, None
     if existing is not None and settings is None:
         require_valid(existing)
         light_mesh = existing
@@ -111,13 +113,14 @@ def bake(
         created = create_light_mesh(snapshot.meshes, shape, progress, keep)
         light_mesh, creation = created.light_mesh, created.report
         if faces is not None:
-            light_mesh, face_tags = tagged_by_map(light_mesh, created.light_of_triangle, faces)
+            light_mesh, tags = tagged_by_map(light_mesh, created.light_of_triangle, faces)
+            face_tags, paired_links = tags.face_tags, tags.paired
             meshes = faces.tagged(meshes, face_tags)
         if chosen.split_share > 0.0:
             light_mesh = _split(light_mesh, locked, chosen)
     findings = check_light_mesh(light_mesh, meshes)
     made = creation.findings if creation is not None else ()
-    return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings), face_tags)
+    return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings), face_tags, paired_links)
 
 
 def _split(light_mesh: VirtualLightMesh, locked: int, settings: BakeSettings) -> VirtualLightMesh:

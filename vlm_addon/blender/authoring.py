@@ -28,7 +28,8 @@ from .interface.translation import told
 from .light_faces import write_faces
 from .names import LOCK_ATTRIBUTE, NAME, SOURCES_PROPERTY
 from .tagging.source_faces import SourceFaces, read_source_faces
-from .tagging.source_tags import faces_to_tag, require_unchanged, write_face_tags
+from .tagging.source_tags import faces_to_tag, received_tags, require_unchanged, write_face_tags
+from .tagging.stored_links import mark_paired
 from .write_back import write_light_mesh
 
 TAG_REGIONS = {
@@ -99,7 +100,7 @@ def from_objects(
     options = ExtractOptions(objects=frozenset(sources))
     if not tag_regions:
         return _work(extract_scene(options), name, sources, settings, None, keep)
-    tagged = read_source_faces(options)
+    tagged = read_source_faces(options).by_face()
     return _work(tagged.snapshot, name, sources, settings, tagged, keep)
 
 
@@ -134,9 +135,11 @@ def _work(
 ) -> Callable[[Progress], Made]:
     locked = len(keep) if keep is not None else 0
     kept = () if keep is None else (keep.tag_ids, keep.links[np.isin(keep.links[:, 0], keep.tag_ids)])
-    replaced = bpy.data.scenes[snapshot.name].objects.get(name)
-    faces = faces_to_tag(tagged, replaced, kept) if tagged is not None else None
-    plain = replace(snapshot, meshes=tuple(map(without_automatic, snapshot.meshes)))
+    scene = bpy.data.scenes[snapshot.name]
+    replaced = next((thing for thing in light_mesh_objects(scene) if thing.name == name), None)
+    faces = faces_to_tag(tagged, scene, replaced, kept) if tagged is not None else None
+    received = received_tags()
+    plain = replace(snapshot, meshes=tuple(without_automatic(mesh, received) for mesh in snapshot.meshes))
 
     def work(progress: Progress) -> Made:
         made = bake(plain, None, settings, progress, faces, keep)
@@ -160,6 +163,8 @@ def write(made: Made) -> str:
     written = write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
     if made.tagged is not None and made.bake.face_tags is not None:
         write_face_tags(made.tagged, made.bake.face_tags)
+    if made.bake.paired_links is not None:
+        mark_paired(written, made.bake.paired_links)
     if made.locked:
         write_faces(written, LOCK_ATTRIBUTE, np.arange(len(made.bake.light_mesh)) < made.locked)
     set_made_from(written, made.made_from)

@@ -48,9 +48,12 @@ def separate(tagging: Tagging, progress: Progress) -> Retagged:
         new_face.get(TagUse(tag, _place_owner(place)), tag)
         for tag, place in zip(tagging.source.tags.tolist(), place_of.tolist(), strict=True)
     ]
-    links = tuple(_renamed(each, new_light, number) for number, each in enumerate(tagging.links))
+    links, paired = (
+        tuple(_renamed(each, new_light, number) for number, each in enumerate(parts))
+        for parts in (tagging.links, tagging.paired)
+    )
     changed = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
-    return Retagged(tagging, *changed, links, len(found.repaired))
+    return Retagged(tagging, *changed, links, paired, len(found.repaired))
 
 
 def _order(use: TagUse) -> tuple[int, int]:

@@ -8,19 +8,19 @@ out is left out still (core/tag_pairs.py; seed 002, section 3.4).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from .errors import InvalidInput
-from .light_links import MOST_LINKS, leaves_out, make_links, no_links
+from .light_links import MOST_LINKS, is_link, make_links, no_links
+from .light_mesh import VirtualLightMesh
 from .mesh_topology import Bool, Int64, rows_by_key
 from .scene import UNTAGGED, Int32
-from .tag_pairs import is_automatic, take_common_tag, unpaired
+from .tag_pairs import SurfaceFaces, is_automatic, take_common_tag, unpaired
 from .tags import numbered_sets
-
 
 MOST_TRIED = 4 * MOST_LINKS
 """Links that are looked at, some of them twice, to see whether they are too many."""
@@ -87,6 +87,24 @@ def pair_exactly(
     return Tags(light_tags, tags, joined, make_links(made.pairs[made.paired]), *_elsewhere(known))
 
 
+def tagged_by_map(
+    light_mesh: VirtualLightMesh, light_of_triangle: Sequence[npt.ArrayLike], faces: SurfaceFaces
+) -> tuple[VirtualLightMesh, Tags]:
+    """The light mesh with tags and links by which each face leaves out its own lights, and the tags of all.
+
+    light_of_triangle: for each mesh, (its triangles,) int, -1 for none. Raises InvalidInput for too many links.
+    """
+    lights = np.concatenate([np.zeros(0, np.int64), *(np.asarray(part, np.int64) for part in light_of_triangle)])
+    rows = np.concatenate([np.zeros(0, np.int64), *faces.rows])
+    kept = (lights >= 0) & (rows >= 0)
+    links = make_links(np.concatenate([light_mesh.links, faces.links]))
+    known = Tags(light_mesh.tag_ids, faces.tags, links, elsewhere_lights=faces.light_tags)
+    found = pair_exactly(lights[kept], rows[kept], known, faces.first_tag, faces.groups)
+    # Links of other lights stay with these.
+    own = np.isin(found.links[:, 0], found.light_tags) | ~is_link(found.links, faces.links)
+    return replace(light_mesh, tag_ids=found.light_tags, links=make_links(found.links[own])), found
+
+
 def _elsewhere(known: Tags) -> tuple[Int32, Int32]:
     return known.elsewhere_lights, known.elsewhere_faces
 
@@ -102,7 +120,7 @@ class _Links:
     @staticmethod
     def of(known: Tags) -> _Links:
         links = known.links.astype(np.int64).reshape(-1, 2)
-        return _Links(links, leaves_out(known.paired, links[:, 0], links[:, 1]) & bool(len(known.paired)))
+        return _Links(links, is_link(known.links, known.paired))
 
     def with_(self, pairs: Int64, paired: npt.ArrayLike) -> _Links:
         paired = np.broadcast_to(np.asarray(paired, bool), len(pairs))

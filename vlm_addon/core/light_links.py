@@ -60,6 +60,11 @@ def require_links(links: Any) -> None:
         raise InvalidInput(_SUBJECT, "they are not sorted pairs, each once", "make them with make_links")
 
 
+def is_link(pairs: Int32, links: Int32) -> Bools:
+    """(k,) whether each of `pairs`, (k, 2), is one of `links`."""
+    return np.isin(_keys(pairs[:, 0], pairs[:, 1]), _keys(links[:, 0], links[:, 1]))
+
+
 def leaves_out(links: Int32, light_tags: npt.ArrayLike, surface_tags: npt.ArrayLike) -> Bools:
     """Whether lights of a tag send nothing to surfaces of a tag, of two int32 arrays that are broadcast."""
     of_lights, of_surfaces = np.asarray(light_tags), np.asarray(surface_tags)

@@ -8,14 +8,13 @@ section 3.4; tags.py). What carries a tag keeps it; what is missing is added wit
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from .errors import InvalidInput
-from .light_links import MOST_LINKS, leaves_out, make_links
-from .light_mesh import VirtualLightMesh
+from .light_links import MOST_LINKS, leaves_out, make_links, no_links
 from .mesh_topology import Bool, Int64
 from .scene import UNTAGGED, Int32, Mesh
 from .tags import RegionTags, region_tags
@@ -35,9 +34,13 @@ def living_tags(face_tags: Int32, known: Int32) -> Int32:
     return np.where(dead, UNTAGGED, face_tags).astype(np.int32)
 
 
-def without_automatic(mesh: Mesh) -> Mesh:
-    """The mesh with the tags alone that artists have given: a new light mesh need not keep regions of an old one."""
-    return replace(mesh, tag_ids=np.where(is_automatic(mesh.tag_ids), UNTAGGED, mesh.tag_ids).astype(np.int32))
+def without_automatic(mesh: Mesh, received: npt.ArrayLike = ()) -> Mesh:
+    """The mesh with the tags alone that artists have given: a new light mesh need not keep regions of an old one.
+
+    received: ids of objects that are left out (`exact_tags.only_received`), which are not meant for their own lights.
+    """
+    forgotten = is_automatic(mesh.tag_ids) | np.isin(mesh.tag_ids, received)
+    return replace(mesh, tag_ids=np.where(forgotten, UNTAGGED, mesh.tag_ids).astype(np.int32))
 
 
 def add_tags(
@@ -150,32 +153,19 @@ def unpaired(lights: Int64, faces: Int64, light_tags: Int32, face_tags: Int32, l
 class SurfaceFaces:
     """Where the tags of visible triangles are kept. rows: for each mesh, (its triangles,) int32 row of `tags`, -1 for
     none. tags: (f,) int32, the present ones. groups: (f,) int, which thing each row is of. first_tag: from here on no
-    id is used."""
+    id is used. links: (k, 2) int32 that there are; light_tags: ids that lights carry besides."""
 
     rows: tuple[Int32, ...]
     tags: Int32
     groups: Int64
     first_tag: int
+    links: Int32 = field(default_factory=no_links)
+    light_tags: Int32 = field(default_factory=lambda: np.zeros(0, np.int32))
 
     def tagged(self, meshes: Sequence[Mesh], tags: Int32) -> tuple[Mesh, ...]:
         """The meshes as they are with `tags`, (f,) int32, in place of the present ones."""
         known = np.append(tags, np.int32(UNTAGGED))  # the row -1 is the last one
         return tuple(replace(mesh, tag_ids=known[rows]) for mesh, rows in zip(meshes, self.rows, strict=True))
-
-
-def tagged_by_map(
-    light_mesh: VirtualLightMesh, light_of_triangle: Sequence[npt.ArrayLike], faces: SurfaceFaces
-) -> tuple[VirtualLightMesh, Int32]:
-    """The light mesh with tags and links, and the tags of `faces`, by which each face leaves out its own lights.
-
-    light_of_triangle: for each mesh, (its triangles,) int, -1 for none. Raises InvalidInput for too many links.
-    """
-    lights = np.concatenate([np.zeros(0, np.int64), *(np.asarray(part, np.int64) for part in light_of_triangle)])
-    rows = np.concatenate([np.zeros(0, np.int64), *faces.rows])
-    kept = (lights >= 0) & (rows >= 0)
-    tags, links = light_mesh.tag_ids, light_mesh.links
-    found = add_tags(lights[kept], rows[kept], tags, faces.tags, links, faces.first_tag, faces.groups)
-    return replace(light_mesh, tag_ids=found.light_tags, links=found.links), found.face_tags
 
 
 @dataclass(frozen=True)

@@ -81,10 +81,11 @@ def used_tags() -> Int32:
     return np.unique(np.concatenate([tags_of_lights(), *surfaces]))
 
 
-def tags_of_lights(replaced: Any = None) -> Int32:
-    """All ids that lights and links of the file carry, those of the light mesh `replaced` left out, each once."""
+def tags_of_lights(replaced: Any = None, links: bool = True) -> Int32:
+    """All ids that lights of the file carry, those of the light mesh `replaced` left out, each once. links: and those
+    that their links name."""
     things = [each for each in bpy.data.objects if is_light_mesh(each) and each.type == "MESH" and each != replaced]
-    found = [*map(tags_of, things), *(read_links(thing).ravel() for thing in things)]
+    found = [*map(tags_of, things), *(read_links(thing).ravel() for thing in things if links)]
     return np.unique(np.concatenate([np.zeros(0, np.int32), *found]))
 
 

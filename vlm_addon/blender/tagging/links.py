@@ -16,14 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.errors import InvalidInput
-from ...core.light_links import make_links
+from ...core.light_links import is_link, make_links
 from ...core.scene import UNTAGGED, Int32
+from ...core.tag_pairs import is_automatic
 from ..authoring import lights as lights_text
 from ..interface.availability import has_geometry
 from ..light_faces import chosen_faces, read_faces, write_faces
 from ..light_meshes import chosen_light_meshes, is_local, light_meshes, new_tags, require_editable, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
-from .stored_links import read_links, write_links
+from .light_tags import tags_of_lights
+from .stored_links import read_links, read_paired_links, write_links
 
 Bool = npt.NDArray[np.bool_]
 
@@ -102,17 +104,18 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
 
 
 def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
-    """Let the chosen lights light `receivers` again, or everything where there are none. Tags stay.
+    """Let the chosen lights light `receivers` again, or all there is without any. Tags stay, as do links of pairing.
 
     A pair of ids is taken away wherever it is stored in the scene. Raises InvalidInput as `link_receivers`.
     """
     chosen = _chosen_lights(context)
-    light_tags = np.unique(np.concatenate([each.tags for each in chosen]))
+    paired = np.concatenate([make_links([]), *(read_paired_links(thing) for thing in light_meshes(context.scene))])
+    light_tags = _with_former(np.unique(np.concatenate([each.tags for each in chosen])), paired)
     receiver_tags = [tag for thing in receivers for tag in _receiver_tags(thing)]
     remaining, gone = {}, [np.zeros((0, 2), np.int32)]
     for thing in light_meshes(context.scene):
         links = read_links(thing)
-        taken = np.isin(links[:, 0], light_tags)
+        taken = np.isin(links[:, 0], light_tags) & ~is_link(links, paired)
         if receivers:
             taken &= np.isin(links[:, 1], receiver_tags)
         if taken.any():
@@ -125,6 +128,12 @@ def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
         write_links(context.scene.objects[name], links)
     pairs = np.concatenate(gone)
     return _told(context, len(pairs), chosen, receivers, pairs)
+
+
+def _with_former(light_tags: Int32, paired: Int32) -> Int32:
+    """`light_tags` with ids that an artist gave, that pairing has put these in place of, and that no light has left."""
+    former = paired[np.isin(paired[:, 0], light_tags) & ~is_automatic(paired[:, 1]), 1]
+    return np.concatenate([light_tags, former[~np.isin(former, tags_of_lights(links=False))]])
 
 
 def _leave_edit_mode(context: Any) -> None:

@@ -49,6 +49,8 @@ class SourceFaces:
     instances it. rows: for each mesh, (t,) int32 row of `tags` that decides for each triangle, NO_FACE where it cannot
     be written. tags: (rows,) int32, the present tags. places: where the rows are, in order. read_only: names of objects
     whose tags belong to another file. as_wholes: names of objects of which some triangles lead back to no face.
+    face_rows: for each mesh, (t,) int32 row of each triangle's own face where it is known, though the tag of its object
+    decides, and all objects that show the face have the same. stored: (rows,) int32, what the file has.
     """
 
     snapshot: SceneSnapshot
@@ -58,11 +60,24 @@ class SourceFaces:
     places: tuple[TagPlace, ...]
     read_only: tuple[str, ...]
     as_wholes: tuple[str, ...]
+    face_rows: tuple[Int32, ...]
+    stored: Int32
 
     @property
     def groups(self) -> Int64:
         """(rows,) index into `places` of each row."""
         return np.repeat(np.arange(len(self.places)), [place.count for place in self.places])
+
+    def by_face(self) -> SourceFaces:
+        """The same with `face_rows`: what is paired with a face of an object is not to hold for all of the object."""
+        tags = self.tags.copy()
+        for rows, faces in zip(self.rows, self.face_rows, strict=True):
+            tags[faces[faces != NO_FACE]] = self.tags[rows[faces != NO_FACE]]
+        return replace(self, rows=self.face_rows, tags=tags)
+
+    def to_store(self, tags: Int32) -> Int32:
+        """(rows,) int32 what to store for `tags`: faces whose tag has not changed go on following their object."""
+        return np.where(tags == self.tags, self.stored, tags).astype(np.int32)
 
     def place_of(self, rows: npt.ArrayLike) -> Int64:
         """Index into `places` of each row."""
@@ -79,6 +94,7 @@ def read_source_faces(options: ExtractOptions | None = None) -> SourceFaces:
     wholes = {place.name: place.first for place in places if not place.of_mesh}
     owners = tuple(_owners(mesh.name) for mesh in numbered.meshes)
     rows: list[Int32] = []
+    known: list[Int32] = []
     read_only: set[str] = set()
     as_wholes: set[str] = set()
     for mesh, names in zip(numbered.meshes, owners, strict=True):
@@ -86,14 +102,47 @@ def read_source_faces(options: ExtractOptions | None = None) -> SourceFaces:
         found = mesh.tag_ids - 1 if local else np.full(len(mesh.tag_ids), NO_FACE, np.int32)
         if (found == NO_FACE).any():
             (as_wholes if names[0] in wholes else read_only).add(names[0])
+        known.append(found.astype(np.int32))
         rows.append(_deciding_rows(found, [wholes[name] for name in names if name in wholes], tags))
     meshes = tuple(
         replace(mesh, tag_ids=np.append(tags, np.int32(UNTAGGED))[each])  # NO_FACE is the last row
         for mesh, each in zip(numbered.meshes, rows, strict=True)
     )
     snapshot = replace(numbered, meshes=meshes)
-    listed = (tuple(sorted(names)) for names in (read_only, as_wholes))
-    return SourceFaces(snapshot, owners, tuple(rows), tags, places, *listed)
+    unwritten, whole = tuple(sorted(read_only)), tuple(sorted(as_wholes))
+    face_rows = _face_rows(known, rows, tags, _hidden_tags(places, {names[0] for names in owners}))
+    return SourceFaces(snapshot, owners, tuple(rows), tags, places, unwritten, whole, face_rows, tags)
+
+
+def _face_rows(
+    known: Sequence[Int32], rows: Sequence[Int32], tags: Int32, hidden: Sequence[tuple[slice, int]]
+) -> tuple[Int32, ...]:
+    """The face of each triangle where it has one and the same tag wherever it is shown, else what decides.
+
+    hidden: rows of faces that some object besides has, and its tag.
+    """
+    low, high = np.full(len(tags), np.iinfo(np.int32).max), np.full(len(tags), UNTAGGED)
+    for faces, deciding in zip(known, rows, strict=True):
+        found = faces != NO_FACE
+        np.minimum.at(low, faces[found], tags[deciding[found]])
+        np.maximum.at(high, faces[found], tags[deciding[found]])
+    for at, tag in hidden:
+        follows = tags[at] == UNTAGGED
+        low[at] = np.where(follows, np.minimum(low[at], tag), low[at])
+        high[at] = np.where(follows, np.maximum(high[at], tag), high[at])
+    alike = np.append(low == high, False)  # NO_FACE is the last row
+    return tuple(np.where(alike[faces], faces, deciding) for faces, deciding in zip(known, rows, strict=True))
+
+
+def _hidden_tags(places: Sequence[TagPlace], shown: set[str]) -> list[tuple[slice, int]]:
+    """For each object that is not `shown`: the rows of its mesh's faces, and its tag as a whole."""
+    at = {place.key: slice(place.first, place.first + place.count) for place in places if place.of_mesh}
+    hidden = (thing for thing in bpy.data.objects if thing.type == "MESH" and thing.name not in shown)
+    return [
+        (at[thing.data.name_full], int(thing.get(TAG_PROPERTY, UNTAGGED)))
+        for thing in hidden
+        if thing.data.name_full in at
+    ]
 
 
 def _deciding_rows(faces: Int32, wholes: Sequence[int], tags: Int32) -> Int32:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Links between lights and surfaces as a property of a light mesh object."""
+"""Links between lights and surfaces as properties of a light mesh object: all of them, and those that pairing made."""
 
 from __future__ import annotations
 
@@ -8,27 +8,49 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InvalidInput
-from ...core.light_links import make_links
+from ...core.light_links import is_link, make_links
 from ...core.scene import Int32
-from ..names import LINKS_PROPERTY
+from ..names import LINKS_PROPERTY, PAIRED_LINKS_PROPERTY
 
 
 def read_links(thing: Any) -> Int32:
     """(k, 2) int32: the links of a light mesh object. Raises InvalidInput where its property holds none."""
-    stored = thing.get(LINKS_PROPERTY)
+    return _read(thing, LINKS_PROPERTY)
+
+
+def read_paired_links(thing: Any) -> Int32:
+    """(p, 2) int32: those of its links that pairing has made. Raises InvalidInput where a property holds no links."""
+    return common_links(_read(thing, PAIRED_LINKS_PROPERTY), read_links(thing))
+
+
+def common_links(one: Int32, other: Int32) -> Int32:
+    """The links of `one` that are among those of `other`."""
+    return make_links(one[is_link(one, other)])
+
+
+def _read(thing: Any, name: str) -> Int32:
+    stored = thing.get(name)
     if stored is None:
         return make_links([])
     values = np.asarray(stored.to_list() if hasattr(stored, "to_list") else stored)
     if values.ndim != 1 or len(values) % 2 or (len(values) and values.dtype.kind not in "iu"):
         subject = f"light mesh {thing.name!r}"
-        problem = f"its property {LINKS_PROPERTY} holds no pairs of tag ids"
+        problem = f"its property {name} holds no pairs of tag ids"
         raise InvalidInput(subject, problem, "remove it (Object > Custom Properties) and link again")
     return make_links(values.reshape(-1, 2))
 
 
-def write_links(thing: Any, links: Int32) -> None:
-    """Store links as `make_links` gives them; without any there is no property."""
-    if len(links):
-        thing[LINKS_PROPERTY] = links.ravel().tolist()
-    elif LINKS_PROPERTY in thing:
-        del thing[LINKS_PROPERTY]
+def mark_paired(thing: Any, paired: Int32) -> None:
+    """Take the links `paired`, as far as the light mesh has them, for made by pairing."""
+    write_links(thing, read_links(thing), make_links(np.concatenate([read_paired_links(thing), paired])))
+
+
+def write_links(thing: Any, links: Int32, paired: Int32 | None = None) -> None:
+    """Store links as `make_links` gives them, and which of them pairing has made: by default those that it had of
+    them; without any there is no property."""
+    made = common_links(_read(thing, PAIRED_LINKS_PROPERTY) if paired is None else paired, links)
+    for name, stored in ((LINKS_PROPERTY, links), (PAIRED_LINKS_PROPERTY, made)):
+        if not len(stored):
+            thing.pop(name, None)
+        elif not np.array_equal(_read(thing, name), stored):
+            thing[name] = stored.ravel().tolist()

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InvalidInput
-from ...core.light_links import make_links, no_links
+from ...core.exact_tags import Tags, pair_exactly
+from ...core.light_links import make_links
 from ...core.light_mesh import VirtualLightMesh, empty_light_mesh
 from ...core.mesh_topology import Bool
 from ...core.progress import Progress
 from ...core.scene import Int32
-from ...core.tag_pairs import add_tags, living_tags, unpaired
+from ...core.tag_pairs import living_tags, unpaired
 from ...core.thin_surface import thin_triangles
 from ..interface.availability import has_geometry
 from ..light_colors import one_per_mesh
@@ -27,11 +28,12 @@ from ..light_faces import face_count, read_faces
 from ..light_geometry import light_faces_in_world
 from ..light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
 from ..names import TAG_ATTRIBUTE, is_light_mesh
-from .light_tags import counted, tags_of_lights, unused_automatic_tag, write_tags
+from .light_tags import counted, unused_automatic_tag, write_tags
+from .other_lights import OtherLights, StoredLinks, distributed, read_others
 from .region_pairs import RegionPairs, SourceLights, region_pairs
 from .source_faces import NO_FACE, SourceFaces, read_source_faces
 from .source_tags import require_unchanged, write_face_tags
-from .stored_links import read_links, write_links
+from .stored_links import read_links, read_paired_links, write_links
 
 
 @dataclass(frozen=True)
@@ -39,22 +41,40 @@ class Tagging:
     """Lights and visible faces with their tags.
 
     names: of the light meshes. lights: the lights of each. light_tags: of all their faces, numbered through. links: of
-    each. source: the visible surface. known: ids that lights and links of the file carry. unused: from here on no id
-    is used in the file.
+    each; paired: those of them that pairing has made. source: the visible surface. others: the other light meshes of
+    the file. unused: from here on no id is used in the file.
     """
 
     names: tuple[str, ...]
     lights: tuple[SourceLights, ...]
     light_tags: Int32
     links: tuple[Int32, ...]
+    paired: tuple[Int32, ...]
     source: SourceFaces
-    known: Int32
+    others: OtherLights
     unused: int
 
     @property
     def all_links(self) -> Int32:
         """Each link holds for all lights of its id, wherever it is stored."""
-        return make_links(np.concatenate([no_links(), *self.links]))
+        return make_links(np.concatenate([self.others.links, *self.links]))
+
+    @property
+    def known(self) -> Int32:
+        """Ids that lights and links of the file carry, in any order and number."""
+        return np.concatenate([self.light_tags, self.all_links.ravel(), self.others.tags]).astype(np.int32)
+
+    def tags(self) -> Tags:
+        """What pairing starts from."""
+        paired = make_links(np.concatenate([self.others.paired, *self.paired]))
+        face_tags = living_tags(self.source.tags, self.known)
+        return Tags(self.light_tags, face_tags, self.all_links, paired, self.others.tags)
+
+    def stored(self, light_tags: Int32) -> list[StoredLinks]:
+        """Where links are stored: with the light meshes, whose lights have `light_tags` now, and with others."""
+        tags = map(np.unique, _by_light_mesh(self, light_tags))
+        own = [StoredLinks(*each) for each in zip(self.names, tags, self.links, self.paired, strict=True)]
+        return [*own, *self.others.writable]
 
     def rows_of_triangles(self) -> Int32:
         """(t,) row of each triangle's tag, over all meshes."""
@@ -67,13 +87,18 @@ class Tagging:
 
 @dataclass(frozen=True)
 class Retagged:
-    """New tags and links in place of those of `before`; pairs: how many a face leaves out that were lit before."""
+    """New tags and links in place of those of `before`; pairs: how many a face leaves out that were lit before.
+
+    elsewhere: links of other light meshes that change.
+    """
 
     before: Tagging
     light_tags: Int32
     face_tags: Int32
     links: tuple[Int32, ...]
+    paired: tuple[Int32, ...]
     pairs: int
+    elsewhere: tuple[StoredLinks, ...] = ()
 
 
 def read_tagging(context: Any, things: Sequence[Any], objects: Sequence[Any] = ()) -> Tagging:
@@ -102,8 +127,9 @@ def read_tagging(context: Any, things: Sequence[Any], objects: Sequence[Any] = (
         lights=tuple(lights),
         light_tags=np.concatenate([np.zeros(0, np.int32), *tags]),
         links=tuple(read_links(thing) for thing in things),
+        paired=tuple(read_paired_links(thing) for thing in things),
         source=source,
-        known=tags_of_lights(),
+        others=read_others(context.scene, things),
         unused=unused_automatic_tag(),
     )
 
@@ -149,22 +175,21 @@ def pair_lights(tagging: Tagging, chosen: Bool, progress: Progress) -> Retagged:
 
 
 def _paired(tagging: Tagging, pairs: RegionPairs, needed: Bool | None) -> Retagged:
+    tagging = replace(tagging, source=tagging.source.by_face())
     rows = tagging.rows_of_triangles()[pairs.triangles]
     kept = rows != NO_FACE
     if needed is not None:
         kept &= needed[pairs.triangles]
     lights, faces = pairs.lights[kept], rows[kept].astype(np.int64)
-    links = tagging.all_links
-    face_tags = living_tags(tagging.source.tags, tagging.known)
-    lit = unpaired(lights, faces, tagging.light_tags, face_tags, links)
+    known = tagging.tags()
+    lit = unpaired(lights, faces, known.light_tags, known.face_tags, known.links)
     missing = len(np.unique(np.stack([lights[lit], faces[lit]], axis=1), axis=0))
-    known = tagging.light_tags, face_tags, links
-    found = add_tags(lights, faces, *known, tagging.unused, tagging.source.groups)
-    new_links = [
-        make_links(np.concatenate([before, found.links[np.isin(found.links[:, 0], tags)]]))
-        for before, tags in zip(tagging.links, _by_light_mesh(tagging, found.light_tags), strict=True)
-    ]
-    return Retagged(tagging, found.light_tags, found.face_tags, tuple(new_links), missing)
+    found = pair_exactly(lights, faces, known, tagging.unused, tagging.source.groups)
+    stored = distributed(tagging.stored(found.light_tags), known.links, found.links, found.paired)
+    own, others = stored[: len(tagging.names)], stored[len(tagging.names) :]
+    changed = (new for new, old in zip(others, tagging.others.writable, strict=True) if len(new.links) > len(old.links))
+    links, paired = tuple(each.links for each in own), tuple(each.paired for each in own)
+    return Retagged(tagging, found.light_tags, found.face_tags, links, paired, missing, tuple(changed))
 
 
 def _by_light_mesh(tagging: Tagging, light_tags: Int32) -> list[Int32]:
@@ -197,10 +222,13 @@ def write_retagged(context: Any, made: Retagged) -> Written:
         _unchanged_light_mesh(context.scene, name, tags) for name, tags in zip(before.names, light_tags, strict=True)
     ]
     require_unchanged(before.source, made.face_tags)
-    for thing, tags, old, links in zip(things, light_tags, before.links, made.links, strict=True):
+    changed = [context.scene.objects.get(each.name) for each in made.elsewhere]
+    for thing, tags, links, paired in zip(things, light_tags, made.links, made.paired, strict=True):
         write_tags(thing, tags)
-        if not np.array_equal(old, links):
-            write_links(thing, links)
+        write_links(thing, links, paired)
+    for thing, each in zip(changed, made.elsewhere, strict=True):
+        if thing is not None:
+            write_links(thing, each.links, each.paired)
     faces, objects = write_face_tags(before.source, made.face_tags)
     return Written(
         lights=int((made.light_tags != before.light_tags).sum()),
