@@ -4,7 +4,7 @@
 from bpy.types import Operator
 
 from ..vlm_addon.blender import light_colors
-from ..vlm_addon.blender.face_operator import LightOperator
+from ..vlm_addon.blender.light_operator import LightOperator
 
 
 class VLM_OT_lock_lights(LightOperator, Operator):  # noqa: N801 (Blender's naming of classes)

@@ -6,7 +6,7 @@ from bpy.types import Operator
 
 from ..vlm_addon.blender import light_colors, recolor
 from ..vlm_addon.blender.eyedropper import Eyedropper
-from ..vlm_addon.blender.face_operator import LightOperator
+from ..vlm_addon.blender.light_operator import LightOperator
 
 
 class VLM_OT_pick_color(Eyedropper, LightOperator, Operator):  # noqa: N801 (Blender's naming of classes)

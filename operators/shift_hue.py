@@ -5,7 +5,7 @@ import bpy
 from bpy.types import Operator
 
 from ..vlm_addon.blender import light_colors
-from ..vlm_addon.blender.face_operator import LightOperator
+from ..vlm_addon.blender.light_operator import LightOperator
 from ..vlm_addon.core import color_changes
 
 

@@ -14,7 +14,6 @@ import bpy
 from ..core.errors import InvalidInput, VlmError
 from ..core.whole_file import atomic_output
 
-BLEND_MAGIC = b"BLENDER"
 GZIP_MAGIC = b"\x1f\x8b"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 HEADER_BYTES = 17

@@ -9,9 +9,7 @@ from typing import Any
 from ..core.errors import VlmError
 from .authoring import allow, lights
 from .interface.availability import light_faces_problem
-from .light_colors import one_per_mesh
-from .light_faces import Bool, chosen_faces
-from .light_meshes import chosen_light_meshes, require_editable
+from .light_meshes import chosen_light_meshes
 
 
 class LightOperator:
@@ -43,21 +41,3 @@ class LightOperator:
             return {"CANCELLED"}
         self.report({"INFO"}, f"Changed {lights(changed)}")
         return {"FINISHED"}
-
-
-class FaceOperator(LightOperator):
-    """Mixin of bpy.types.Operator for a change that each light mesh can take by itself.
-
-    Chosen are the selected faces of the light meshes in edit mode, or all faces of those selected in object mode. All
-    light meshes are asked whether they can be changed before the first one is; a mesh that objects share changes once.
-    """
-
-    def change(self, context: Any, thing: Any, chosen: Bool) -> int:
-        """Change the faces `chosen` of one light mesh; returns how many changed. Raises VlmError."""
-        raise NotImplementedError
-
-    def change_all(self, context: Any, things: Sequence[Any]) -> int:
-        """`change` of each."""
-        for thing in things:
-            require_editable(thing)
-        return sum(self.change(context, thing, chosen_faces(thing)) for thing in one_per_mesh(things))
