@@ -157,6 +157,30 @@ def test_lighting_again_after_leaving_out_and_pairing(room):
     assert all(link[0] >= FIRST_AUTOMATIC for link in read_links(lights).tolist())
 
 
+def test_ids_that_leaving_out_gave_go_with_it_and_pairing_finds_the_scene_as_it_was(room):
+    """An id left on the floor would go to all its lights, which black it out."""
+    lights, floor = room[3], room[0]
+    choose(lights, floor)
+    link()
+    unlink()
+    assert "vlm_tag" not in floor
+    assert not read_faces(lights, "vlm_tag").any()
+    pair(lights)
+    assert_same(left_out(), own())
+
+
+def test_ids_that_are_good_for_something_stay(room):
+    floor, plate, far, lights = room
+    floor["vlm_tag"], plate["vlm_tag"], far["vlm_tag"] = 5, 6, 7
+    write_faces(lights, "vlm_tag", np.array([5, 5, 8, 8, 9, 9]))
+    choose(lights, plate, far)
+    link()
+    unlink()
+    assert floor["vlm_tag"] == 5
+    assert "vlm_tag" not in plate
+    assert read_faces(lights, "vlm_tag").tolist() == [5, 5, 0, 0, 0, 0]
+
+
 def test_an_object_keeps_its_tag_where_its_faces_are_paired(room):
     floor, lights = room[0], room[3]
     choose(lights, floor)

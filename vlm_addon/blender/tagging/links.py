@@ -24,8 +24,10 @@ from ..interface.availability import has_geometry
 from ..light_faces import chosen_faces, read_faces, write_faces
 from ..light_meshes import chosen_light_meshes, is_local, light_meshes, new_tags, require_editable, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
+from ..stored_values import whole_number
 from .light_tags import tags_of_lights
 from .stored_links import read_links, read_paired_links, write_links
+from .unused_ids import forget_unused
 
 Bool = npt.NDArray[np.bool_]
 
@@ -104,7 +106,8 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
 
 
 def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
-    """Let the chosen lights light `receivers` again, or all there is without any. Tags stay, as do links of pairing.
+    """Let the chosen lights light `receivers` again, or all there is without any. Links that pairing has made stay; ids
+    that are good for nothing any more go.
 
     A pair of ids is taken away wherever it is stored in the scene. Raises InvalidInput as `link_receivers`.
     """
@@ -127,7 +130,9 @@ def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
     for name, links in remaining.items():
         write_links(context.scene.objects[name], links)
     pairs = np.concatenate(gone)
-    return _told(context, len(pairs), chosen, receivers, pairs)
+    told = _told(context, len(pairs), chosen, receivers, pairs)
+    forget_unused(pairs)
+    return told
 
 
 def _with_former(light_tags: Int32, paired: Int32) -> Int32:
@@ -195,7 +200,7 @@ def _chosen_lights(context: Any) -> list[_Lights]:
 
 def _needs_tag(thing: Any) -> bool:
     """Whether some of what the object shows has no tag id."""
-    if int(thing.get(TAG_PROPERTY, UNTAGGED)) != UNTAGGED:
+    if whole_number(thing, TAG_PROPERTY) != UNTAGGED:
         return False
     if thing.type != "MESH" or thing.is_instancer or len(thing.modifiers):
         return True

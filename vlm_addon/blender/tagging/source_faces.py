@@ -22,6 +22,7 @@ from ...core.scene import UNTAGGED, Int32, SceneSnapshot
 from ..extraction.extract import ExtractOptions, extract_scene
 from ..light_faces import face_count, read_faces, write_faces
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
+from ..stored_values import whole_number
 
 NO_FACE = -1
 
@@ -139,9 +140,7 @@ def _hidden_tags(places: Sequence[TagPlace], shown: set[str]) -> list[tuple[slic
     at = {place.key: slice(place.first, place.first + place.count) for place in places if place.of_mesh}
     hidden = (thing for thing in bpy.data.objects if thing.type == "MESH" and thing.name not in shown)
     return [
-        (at[thing.data.name_full], int(thing.get(TAG_PROPERTY, UNTAGGED)))
-        for thing in hidden
-        if thing.data.name_full in at
+        (at[thing.data.name_full], whole_number(thing, TAG_PROPERTY)) for thing in hidden if thing.data.name_full in at
     ]
 
 
@@ -186,7 +185,7 @@ def _present_tags(places: Sequence[TagPlace]) -> Int32:
     parts = [np.zeros(0, np.int32)]
     for place in places:
         thing = bpy.data.objects[place.name, None]
-        whole = [int(thing.get(TAG_PROPERTY, UNTAGGED))]
+        whole = [whole_number(thing, TAG_PROPERTY)]
         parts.append(read_faces(thing, TAG_ATTRIBUTE) if place.of_mesh else np.array(whole, np.int32))
     return np.concatenate(parts)
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import InvalidInput
 from ...core.light_links import is_link, make_links
 from ...core.scene import Int32
 from ..names import LINKS_PROPERTY, PAIRED_LINKS_PROPERTY
+from ..stored_values import whole_numbers, wrong_value
 
 
 def read_links(thing: Any) -> Int32:
@@ -29,14 +29,9 @@ def common_links(one: Int32, other: Int32) -> Int32:
 
 
 def _read(thing: Any, name: str) -> Int32:
-    stored = thing.get(name)
-    if stored is None:
-        return make_links([])
-    values = np.asarray(stored.to_list() if hasattr(stored, "to_list") else stored)
-    if values.ndim != 1 or len(values) % 2 or (len(values) and values.dtype.kind not in "iu"):
-        subject = f"light mesh {thing.name!r}"
-        problem = f"its property {name} holds no pairs of tag ids"
-        raise InvalidInput(subject, problem, "remove it (Object > Custom Properties) and link again")
+    values = whole_numbers(thing, name)
+    if len(values) % 2:
+        raise wrong_value(thing, name, "pairs of tag ids")
     return make_links(values.reshape(-1, 2))
 
 
