@@ -86,3 +86,18 @@ def test_what_cannot_be_made_again_says_why(cube_lights, make_plane):
     assert create_again.again_problem(bpy.context) == "All that VLM was made from is gone"
     bpy.context.view_layer.objects.active = make_plane()
     assert create_again.again_problem(bpy.context) == "Select the light mesh that is to be made again"
+
+
+def test_a_light_mesh_copied_with_its_source_is_made_again_of_the_copy(cube_lights):
+    cube = bpy.data.objects["Cube"]
+    for each in bpy.context.view_layer.objects:
+        each.select_set(each in (cube, cube_lights))
+    bpy.ops.object.duplicate()
+    copies = [each for each in bpy.context.selected_objects if each not in (cube, cube_lights)]
+    for each in copies:
+        each.location.x += 10.0
+    bpy.context.view_layer.objects.active = next(each for each in copies if "vlm_schema" in each)
+    bpy.context.view_layer.update()
+    again()
+    assert bpy.context.view_layer.objects.active.location.x == pytest.approx(10.0)
+    assert cube_lights.location.x == pytest.approx(0.0)

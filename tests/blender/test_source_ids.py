@@ -4,7 +4,7 @@
 import bpy
 import pytest
 
-from vlm_addon.blender.light_meshes import ensure_id, light_meshes_of, set_sources, sources
+from vlm_addon.blender.light_meshes import add_sources, ensure_id, light_meshes_of, set_sources, sources
 
 
 @pytest.fixture
@@ -90,3 +90,58 @@ def test_sources_that_are_gone_are_none(make_lights, make_cube, scene):
     bpy.data.objects.remove(cube)
     make_cube("Cube")["vlm_id"] = 5
     assert sources(lights, scene) == [None, bpy.data.objects["Wall"]]
+
+
+def shift_d(*things):
+    """Duplicate objects as Shift+D does; returns the copies in the same order."""
+    bpy.context.view_layer.update()
+    for each in bpy.context.view_layer.objects:
+        each.select_set(each in things)
+    before = {each.name for each in bpy.data.objects}
+    bpy.ops.object.duplicate()
+    made = sorted((each for each in bpy.data.objects if each.name not in before), key=lambda each: each.name)
+    return [next(each for each in made if each.name.startswith(thing.name)) for thing in things]
+
+
+def test_copies_made_together_belong_together_before_they_are_moved(make_lights, make_cube, scene):
+    cube = make_cube("Cube")
+    lights = make_lights("Lights", "Cube")
+    other, lights_of_other = shift_d(cube, lights)
+    assert sources(lights, scene) == [cube]
+    assert sources(lights_of_other, scene) == [other]
+
+
+def test_copies_moved_together_belong_together_whatever_else_was_copied(make_lights, make_cube, scene):
+    cube = make_cube("Cube")
+    lights = make_lights("Lights", "Cube")
+    alone = shift_d(cube)[0]
+    other, lights_of_other = shift_d(cube, lights)
+    for thing in (other, lights_of_other):
+        thing.location.x += 5.0
+    alone.location.y = 3.0
+    bpy.context.view_layer.update()
+    swap_names(cube, alone)
+    swap_names(lights, lights_of_other)
+    assert sources(lights, scene) == [cube]
+    assert sources(lights_of_other, scene) == [other]
+
+
+def test_two_light_meshes_of_one_object_both_stay_with_it_when_it_is_copied(make_lights, make_cube, copy, scene):
+    cube = make_cube("Cube")
+    both = [make_lights("Lights", "Cube"), make_lights("More", "Cube")]
+    copy(cube)
+    assert [sources(each, scene) for each in both] == [[cube], [cube]]
+
+
+def test_objects_added_to_those_that_lights_were_made_of_do_not_change_where_these_were(
+    make_lights, make_cube, copy, scene
+):
+    cube, _ = make_cube("Cube"), make_cube("Wall")
+    lights = make_lights("Lights", "Cube")
+    cube.location.x = 5.0
+    other = copy(cube)
+    other.location.x = 0.0
+    bpy.context.view_layer.update()
+    add_sources(lights, ["Wall"], scene)
+    assert list(lights["vlm_source_places"])[3::12] == [0.0, 0.0]
+    assert sources(lights, scene) == [other, bpy.data.objects["Wall"]]

@@ -3,7 +3,7 @@
 
 Nothing is remembered between calls, so undo, renaming, duplicating, appending, linking and deleting cannot make an
 answer stale. Sources are known by a number (`vlm_id`) that goes with the object through renames; where copies of an
-object share it, or the object is linked and could not be given one, its name decides.
+object share it, source_copies.py decides; where the object is linked and could not be given one, its name.
 """
 
 from __future__ import annotations
@@ -26,11 +26,13 @@ from .names import (
     SCHEMA_PROPERTY,
     SCHEMA_VERSION,
     SOURCE_IDS_PROPERTY,
+    SOURCE_PLACES_PROPERTY,
     SOURCES_PROPERTY,
     TAG_ATTRIBUTE,
     TAG_PROPERTY,
     is_light_mesh,
 )
+from .source_copies import PLACE_SIZE, Place, place_of, right_copy, stored_places
 from .tagging.stored_links import read_links
 
 NO_ID = 0
@@ -53,11 +55,38 @@ def chosen_light_meshes(context: Any) -> list[Any]:
 
 
 def set_sources(thing: Any, names: Sequence[str], scene: Any) -> None:
-    """Remember the objects of `scene` that the light mesh was made from; those that can be written get an id."""
+    """Remember the objects of `scene` that the light mesh was made from, and where they stand now; those that can be
+    written get an id, and the light mesh gets one of its own."""
     found = [scene.objects.get(name) for name in names]
-    thing[SOURCES_PROPERTY] = "\n".join(names)
     counts = _id_counts()
-    thing[SOURCE_IDS_PROPERTY] = [NO_ID if source is None else ensure_id(source, counts) for source in found]
+    ids = [NO_ID if source is None else ensure_id(source, counts) for source in found]
+    ensure_id(thing, counts)
+    thing[SOURCES_PROPERTY], thing[SOURCE_IDS_PROPERTY] = "\n".join(names), ids
+    _store_places(thing, found)
+
+
+def add_sources(thing: Any, names: Sequence[str], scene: Any) -> None:
+    """Remember more objects of `scene`; where the others stood when the light mesh was made stays known."""
+    known = sources(thing, scene)
+    before = stored_places(thing, len(known))
+    now = [name if source is None else source.name for name, source in zip(source_names(thing), known, strict=True)]
+    new = [name for name in names if name not in now and name in scene.objects]
+    if not new:
+        return
+    set_sources(thing, [*now, *new], scene)
+    places = stored_places(thing, len(source_names(thing)))
+    thing[SOURCE_PLACES_PROPERTY] = np.concatenate([*before, *places[len(before) :]]).tolist()
+
+
+def keep_places(thing: Any, scene: Any) -> None:
+    """The light mesh and its sources stand to each other as they should, though its own origin is elsewhere now."""
+    if SOURCES_PROPERTY in thing:
+        _store_places(thing, sources(thing, scene))
+
+
+def _store_places(thing: Any, found: Sequence[Any | None]) -> None:
+    places = [np.zeros(PLACE_SIZE) if source is None else place_of(source, thing) for source in found]
+    thing[SOURCE_PLACES_PROPERTY] = np.concatenate([np.zeros(0), *places]).tolist()
 
 
 def source_names(thing: Any) -> list[str]:
@@ -74,18 +103,26 @@ def sources(thing: Any, scene: Any) -> list[Any | None]:
     for each in scene.objects:
         if ID_PROPERTY in each and not is_light_mesh(each):
             known.setdefault(int(each[ID_PROPERTY]), []).append(each)
-    return [_source(name, known.get(number, []), scene) for name, number in zip(names, ids, strict=False)]
+    rows = zip(names, ids, stored_places(thing, len(names)), strict=False)
+    return [_source(thing, name, known.get(number, []), place, scene) for name, number, place in rows]
 
 
-def _source(name: str, same_id: list[Any], scene: Any) -> Any | None:
+def _source(thing: Any, name: str, same_id: list[Any], place: Place, scene: Any) -> Any | None:
     if len(same_id) == 1:
         return same_id[0]
-    named = [each for each in same_id if each.name == name]
-    if named or same_id:
-        return (named or sorted(same_id, key=lambda each: each.name))[0]
+    if same_id:
+        return right_copy(same_id, name, place, thing, _twins(thing, scene))
     by_name = scene.objects.get(name)
     # An object of that name with another id is another object.
     return by_name if by_name is not None and not is_light_mesh(by_name) and ID_PROPERTY not in by_name else None
+
+
+def _twins(thing: Any, scene: Any) -> list[Any]:
+    """The light mesh and the copies of it that know no other sources, in order of name."""
+    if ID_PROPERTY not in thing:
+        return [thing]
+    keys = (ID_PROPERTY, SOURCES_PROPERTY)
+    return [each for each in light_meshes(scene) if all(each.get(key) == thing.get(key) for key in keys)]
 
 
 def light_meshes_of(source: Any, scene: Any) -> list[Any]:

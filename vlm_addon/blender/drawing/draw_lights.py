@@ -21,7 +21,7 @@ from ...core.scene import Float32, Float64
 from ..extraction.color_space import convert, rec709_to_working
 from ..extraction.materials import DEFAULT_COLOR
 from ..light_faces import DEFAULTS, face_count, read_faces, select_faces, write_faces
-from ..light_meshes import require_editable, set_sources, source_names, sources
+from ..light_meshes import add_sources, require_editable
 from ..names import (
     AREA_SCALE_ATTRIBUTE,
     COLOR_ATTRIBUTE,
@@ -172,7 +172,7 @@ def write_lights(context: Any, made: NewLights, thing: Any | None) -> tuple[Any,
     select_faces(thing, np.arange(face_count(thing)) >= before)
     if thing.mode != "EDIT":
         # Undo in edit mode knows the mesh alone.
-        _remember_sources(thing, made.names, context.scene)
+        add_sources(thing, made.names, context.scene)
     return thing, len(added)
 
 
@@ -247,17 +247,6 @@ def _add_faces(thing: Any, faces: Faces) -> list[int]:
         mesh.verts.index_update()
         mesh.faces.index_update()
     return added
-
-
-def _remember_sources(thing: Any, names: Sequence[str], scene: Any) -> None:
-    """Add the objects that were drawn on to those that the light mesh stands for."""
-    known = [
-        found.name if found is not None else name
-        for name, found in zip(source_names(thing), sources(thing, scene), strict=True)
-    ]
-    new = [name for name in names if name not in known and name in scene.objects]
-    if new:
-        set_sources(thing, [*known, *new], scene)
 
 
 def light_count(count: int) -> str:

@@ -22,7 +22,7 @@ from ...core.scene import Float64
 from ..extraction.dynamics import is_dynamic
 from ..extraction.mesh_arrays import read
 from ..extraction.temporary import restored
-from ..light_meshes import require_editable, set_sources, sources
+from ..light_meshes import keep_places, require_editable, set_sources, sources
 from ..names import DYNAMIC_PROPERTY
 from .follow_rig import PREFIX, add_first, copy_rig, is_following, mark, remove_rig, rig_problem
 from .rest_shape import evaluated_shape, find_rest, set_shape, shape
@@ -111,6 +111,7 @@ def stop_following(thing: Any, context: Any) -> bool:
     set_shape(thing, positions)
     _move_to(thing, None, np.array(thing.matrix_world, np.float64))
     thing[DYNAMIC_PROPERTY] = is_dynamic(thing)
+    keep_places(thing, context.scene)
     return True
 
 
@@ -140,6 +141,7 @@ def _bind(thing: Any, source: Any, context: Any, way: str) -> Following:
     with _without_other_modifiers(thing):
         off = find_rest(thing, local, context)
     thing[DYNAMIC_PROPERTY] = is_dynamic(thing)
+    keep_places(thing, context.scene)
     mean = float(near.distances.mean())
     return Following(thing.name, source.name, SURFACE if by_surface else RIG, len(local), off, mean, note)
 
