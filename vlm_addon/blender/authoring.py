@@ -26,7 +26,8 @@ from .following import animation
 from .interface.availability import has_geometry, light_mesh_objects, rendered_objects
 from .interface.translation import told
 from .light_faces import write_faces
-from .names import LOCK_ATTRIBUTE, NAME, SOURCES_PROPERTY
+from .light_meshes import source_names
+from .names import LOCK_ATTRIBUTE, NAME
 from .tagging.source_faces import SourceFaces, read_source_faces
 from .tagging.source_tags import faces_to_tag, received_tags, require_unchanged, write_face_tags
 from .tagging.stored_links import mark_paired
@@ -178,12 +179,20 @@ def _counted_twice(scene: Any, made: Made) -> list[Finding]:
     """A finding for each light mesh of the scene that stands for some of the same objects."""
     findings = []
     for other in light_mesh_objects(scene):
-        shared = sorted(set(made.sources) & set(str(other.get(SOURCES_PROPERTY, "")).split("\n")))
+        shared = sorted(set(made.sources) & _readable_names(other))
         if shared and other.name != made.name:
             which = f"{shared[0]!r} and {len(shared) - 1} more have" if len(shared) > 1 else f"{shared[0]!r} has"
             problem = f"{which} bounce light in {other.name!r} already, so it counts twice"
             findings.append(Finding(f"light mesh {made.name!r}", problem, "delete one of the two light meshes"))
     return findings
+
+
+def _readable_names(thing: Any) -> set[str]:
+    """Names of its sources, none where they cannot be read: what is made anew does not fail by another light mesh."""
+    try:
+        return set(source_names(thing))
+    except InvalidInput:
+        return set()
 
 
 def require_scene(name: str) -> Any:

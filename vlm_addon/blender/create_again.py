@@ -18,7 +18,7 @@ from .authoring import Made, from_objects
 from .extraction.color_space import convert, working_to_rec709
 from .extraction.light_mesh_io import extract
 from .light_faces import read_faces
-from .light_meshes import require_editable, source_names, sources, tags_of
+from .light_meshes import require_editable, sources, tags_of
 from .names import AREA_SCALE_ATTRIBUTE, COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, is_light_mesh
 
 
@@ -27,9 +27,13 @@ def again_problem(context: Any) -> str | None:
     thing = context.active_object
     if thing is None or not is_light_mesh(thing):
         return "Select the light mesh that is to be made again"
-    if not source_names(thing):
+    try:
+        known = sources(thing, context.scene)
+    except InvalidInput as error:
+        return str(error)
+    if not known:
         return f"{thing.name} was drawn by hand: there is nothing to make it from"
-    if not any(source is not None for source in sources(thing, context.scene)):
+    if not any(source is not None for source in known):
         return f"All that {thing.name} was made from is gone"
     return "Leave this mode first (Tab): light meshes are made in Object Mode" if context.mode != "OBJECT" else None
 

@@ -22,6 +22,7 @@ from .light_factors import NEUTRAL_HUE, NEUTRAL_STRENGTH, describe_factors
 from .light_geometry import LightFaces, light_faces_in_world
 from .light_meshes import require_editable
 from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, HUE_PROPERTY, LOCK_ATTRIBUTE, STRENGTH_PROPERTY
+from .stored_values import factors
 
 COLOR, EMISSION, BOTH = "COLOR", "EMISSION", "BOTH"
 QUANTITIES = (
@@ -163,9 +164,12 @@ def set_strength(things: Sequence[Any], strength: float, hue: Sequence[float]) -
 
 
 def strength_of(thing: Any) -> tuple[float, tuple[float, ...]]:
-    """Strength and hue of a light mesh object."""
-    hue = tuple(float(value) for value in thing.get(HUE_PROPERTY, NEUTRAL_HUE))
-    return float(thing.get(STRENGTH_PROPERTY, NEUTRAL_STRENGTH)), hue
+    """Strength and hue of a light mesh object, neutral where they are not what they should be."""
+    try:
+        strength, hue = factors(thing)
+    except InvalidInput:
+        return NEUTRAL_STRENGTH, NEUTRAL_HUE
+    return strength, tuple(hue.tolist())
 
 
 def light_mesh_count(count: int) -> str:

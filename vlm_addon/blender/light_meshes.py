@@ -33,6 +33,7 @@ from .names import (
     is_light_mesh,
 )
 from .source_copies import PLACE_SIZE, Place, place_of, right_copy, stored_places
+from .stored_values import text, whole_number, whole_numbers
 from .tagging.stored_links import read_links
 
 NO_ID = 0
@@ -90,19 +91,22 @@ def _store_places(thing: Any, found: Sequence[Any | None]) -> None:
 
 
 def source_names(thing: Any) -> list[str]:
-    """The names that the sources had when the light mesh was made, none where it was drawn by hand."""
-    return [name for name in str(thing.get(SOURCES_PROPERTY, "")).split("\n") if name]
+    """The names that the sources had when the light mesh was made, none where it was drawn by hand.
+
+    Raises InvalidInput where they cannot be read, as all that looks up sources does.
+    """
+    return [name for name in text(thing, SOURCES_PROPERTY).split("\n") if name]
 
 
 def sources(thing: Any, scene: Any) -> list[Any | None]:
     """The objects of `scene` that the light mesh was made from, None for each that is gone."""
     names = source_names(thing)
-    ids = [int(value) for value in thing.get(SOURCE_IDS_PROPERTY, ())]
+    ids = whole_numbers(thing, SOURCE_IDS_PROPERTY).tolist()
     ids += [NO_ID] * (len(names) - len(ids))
     known: dict[int, list[Any]] = {}
     for each in scene.objects:
-        if ID_PROPERTY in each and not is_light_mesh(each):
-            known.setdefault(int(each[ID_PROPERTY]), []).append(each)
+        if (number := _id_of(each)) != NO_ID and not is_light_mesh(each):
+            known.setdefault(number, []).append(each)
     rows = zip(names, ids, stored_places(thing, len(names)), strict=False)
     return [_source(thing, name, known.get(number, []), place, scene) for name, number, place in rows]
 
@@ -114,7 +118,7 @@ def _source(thing: Any, name: str, same_id: list[Any], place: Place, scene: Any)
         return right_copy(same_id, name, place, thing, _twins(thing, scene))
     by_name = scene.objects.get(name)
     # An object of that name with another id is another object.
-    return by_name if by_name is not None and not is_light_mesh(by_name) and ID_PROPERTY not in by_name else None
+    return by_name if by_name is not None and not is_light_mesh(by_name) and _id_of(by_name) == NO_ID else None
 
 
 def _twins(thing: Any, scene: Any) -> list[Any]:
@@ -139,8 +143,8 @@ def ensure_id(thing: Any, counts: Counter[int] | None = None) -> int:
     """
     counts = _id_counts() if counts is None else counts
     if not is_local(thing):
-        return int(thing.get(ID_PROPERTY, NO_ID))
-    shared = int(thing.get(ID_PROPERTY, NO_ID))
+        return _id_of(thing)
+    shared = _id_of(thing)
     if counts[shared] == 1:
         return shared
     known = _references(thing) if shared != NO_ID else []
@@ -149,14 +153,22 @@ def ensure_id(thing: Any, counts: Counter[int] | None = None) -> int:
     counts.subtract([shared])
     counts[number] += 1
     for light_mesh, index in known:
-        ids = [int(value) for value in light_mesh[SOURCE_IDS_PROPERTY]]
+        ids = whole_numbers(light_mesh, SOURCE_IDS_PROPERTY).tolist()
         ids[index] = number
         light_mesh[SOURCE_IDS_PROPERTY] = ids
     return number
 
 
 def _id_counts() -> Counter[int]:
-    return Counter(int(each[ID_PROPERTY]) for each in bpy.data.objects if ID_PROPERTY in each)
+    return Counter(number for each in bpy.data.objects if (number := _id_of(each)) != NO_ID)
+
+
+def _id_of(thing: Any) -> int:
+    """NO_ID also where somebody has put something else there: ids are ours to give."""
+    try:
+        return whole_number(thing, ID_PROPERTY, NO_ID)
+    except InvalidInput:
+        return NO_ID
 
 
 def _references(thing: Any) -> list[tuple[Any, int]]:
@@ -165,9 +177,17 @@ def _references(thing: Any) -> list[tuple[Any, int]]:
         (light_mesh, index)
         for scene in bpy.data.scenes
         for light_mesh in light_meshes(scene)
-        for index, source in enumerate(sources(light_mesh, scene))
+        for index, source in enumerate(_readable_sources(light_mesh, scene))
         if source == thing and is_local(light_mesh) and index < len(light_mesh.get(SOURCE_IDS_PROPERTY, ()))
     ]
+
+
+def _readable_sources(light_mesh: Any, scene: Any) -> list[Any | None]:
+    """`sources`, none where they cannot be read: what is written for one light mesh does not fail by another."""
+    try:
+        return sources(light_mesh, scene)
+    except InvalidInput:
+        return []
 
 
 def unused_id(name: str, taken: Container[int]) -> int:
@@ -189,7 +209,7 @@ def require_editable(thing: Any) -> None:
     subject = f"light mesh {thing.name!r}"
     if not is_local(thing):
         raise InvalidInput(subject, "it is linked from another file", "make it local (Object > Relations > Make Local)")
-    version = int(thing[SCHEMA_PROPERTY])
+    version = whole_number(thing, SCHEMA_PROPERTY)
     if version > SCHEMA_VERSION:
         remedy = "open it with the version of the extension that wrote it"
         raise InvalidInput(subject, f"{SCHEMA_PROPERTY} is {version}, not {SCHEMA_VERSION}", remedy)
@@ -197,7 +217,7 @@ def require_editable(thing: Any) -> None:
 
 def tags_of(thing: Any) -> npt.NDArray[np.int32]:
     """The tag ids that a light mesh or a visible object carries, each once, UNTAGGED left out."""
-    found = [int(thing.get(TAG_PROPERTY, UNTAGGED))] if not is_light_mesh(thing) else []
+    found = [whole_number(thing, TAG_PROPERTY)] if not is_light_mesh(thing) else []
     if thing.type == "MESH":
         found += np.unique(read_faces(thing, TAG_ATTRIBUTE)).tolist()
     return np.array(sorted({tag for tag in found if tag != UNTAGGED}), np.int32)

@@ -13,9 +13,11 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ..core.errors import InvalidInput
 from .light_factors import describe_factors
 from .light_meshes import is_local, light_meshes, set_sources, source_names
 from .names import SCHEMA_PROPERTY, SCHEMA_VERSION, SOURCES_PROPERTY
+from .stored_values import whole_number
 
 
 def migrate_file() -> int:
@@ -24,11 +26,15 @@ def migrate_file() -> int:
 
 
 def _migrate(thing: Any, scene: Any) -> bool:
-    if not is_local(thing) or int(thing[SCHEMA_PROPERTY]) >= SCHEMA_VERSION:
-        return False
+    try:
+        if not is_local(thing) or whole_number(thing, SCHEMA_PROPERTY) >= SCHEMA_VERSION:
+            return False
+        names = source_names(thing)
+    except InvalidInput:
+        return False  # who works with it is told so
     describe_factors(thing)
     if SOURCES_PROPERTY in thing:
-        set_sources(thing, source_names(thing), scene)
+        set_sources(thing, names, scene)
     thing[SCHEMA_PROPERTY] = SCHEMA_VERSION
     return True
 

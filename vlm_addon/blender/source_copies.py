@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..core.errors import InvalidInput
 from .names import SOURCE_PLACES_PROPERTY
+from .stored_values import numbers
 
 Place = npt.NDArray[np.float64]
 
@@ -32,7 +34,10 @@ def place_of(source: Any, light_mesh: Any) -> Place:
 
 def stored_places(light_mesh: Any, count: int) -> list[Place]:
     """`place_of` of each of `count` sources when the light mesh was made, zeros where that is not known."""
-    values = np.array(light_mesh.get(SOURCE_PLACES_PROPERTY, ()), np.float64)
+    try:
+        values = numbers(light_mesh, SOURCE_PLACES_PROPERTY)
+    except InvalidInput:
+        values = np.zeros(0)
     if len(values) != count * PLACE_SIZE:
         return [np.zeros(PLACE_SIZE)] * count
     return list(values.reshape(count, PLACE_SIZE))

@@ -24,6 +24,7 @@ from ..interface.availability import GEOMETRY_TYPES
 from ..interface.translation import told
 from ..light_grid_options import scene_grid_settings
 from ..light_meshes import light_meshes
+from ..stored_values import text, wrong_value
 from . import bake_store
 
 WINDOW_PROPERTY = "vlm_bake"
@@ -104,16 +105,18 @@ def compare(context: Any) -> tuple[str, ...]:
 
 
 def made_from(thing: Any) -> dict[str, str]:
-    """Hash by name of the surfaces that a light mesh was made from; empty where that is not known."""
-    text = str(thing.get(MADE_FROM_PROPERTY, ""))
-    if not text:
+    """Hash by name of the surfaces that a light mesh was made from; empty where that is not known.
+
+    Raises InvalidInput where it cannot be read.
+    """
+    stored = text(thing, MADE_FROM_PROPERTY)
+    if not stored:
         return {}
-    subject = f"light mesh {thing.name!r}"
     try:
-        tree = json.loads(text)
-    except ValueError as error:
-        raise InvalidInput(subject, f"{MADE_FROM_PROPERTY} is not JSON ({error})", "make it again") from error
-    return dict(BakeKey.from_json({"surfaces": tree, "lights": "", "settings": ""}, subject).surfaces)
+        tree = {"surfaces": json.loads(stored), "lights": "", "settings": ""}
+        return dict(BakeKey.from_json(tree, MADE_FROM_PROPERTY).surfaces)
+    except (ValueError, InvalidInput) as error:
+        raise wrong_value(thing, MADE_FROM_PROPERTY, "what a light mesh was made from") from error
 
 
 def set_made_from(thing: Any, hashes: Mapping[str, str]) -> None:

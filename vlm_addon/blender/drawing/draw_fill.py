@@ -18,6 +18,7 @@ from ..extraction.mesh_arrays import LocalMesh, place, read, read_mesh
 from ..extraction.mesh_extraction import MeshExtractor
 from ..light_meshes import is_local, light_meshes_of
 from ..names import TAG_PROPERTY, is_light_mesh
+from ..stored_values import whole_number
 from .draw_lights import NewLights, find_target, light_count, write_lights
 from .drawn_faces import Faces
 
@@ -90,7 +91,7 @@ def _read(thing: Any, evaluated: Any, mesh: Any, depsgraph: Any) -> NewLights | 
     deep = intrusions(points[lights], regions, source) > 0.5 * insets(points[lights])
     reflectance, emission = _averages(evaluated, local, rows, depsgraph)
     areas = 0.5 * np.linalg.norm(np.cross(source[:, 1] - source[:, 0], source[:, 2] - source[:, 0]), axis=1)
-    own = int(thing.get(TAG_PROPERTY, UNTAGGED))
+    own = whole_number(thing, TAG_PROPERTY)
     count = int(chosen.sum())
     tags = np.full(count, own, np.int32)
     tags[owners] = np.where(local.face_tags[rows] != UNTAGGED, local.face_tags[rows], own)

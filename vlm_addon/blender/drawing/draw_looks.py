@@ -19,6 +19,7 @@ from ...core.tag_pairs import is_automatic
 from ..extraction.kept_materials import forget_large, material_reader
 from ..extraction.mesh_arrays import LocalMesh, read_attribute
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY
+from ..stored_values import whole_number
 from .draw_surfaces import SurfaceHit
 
 ON_TRIANGLE = 1e-3
@@ -139,7 +140,7 @@ class _Reader:
         original = bpy.data.objects.get(hit.key)
         if original is None:
             return None
-        tag = int(original.get(TAG_PROPERTY, UNTAGGED)) or self._instancer_tag(original, hit)
+        tag = whole_number(original, TAG_PROPERTY) or self._instancer_tag(original, hit)
         if hit.key not in self._surfaces:
             self._surfaces[hit.key] = self._own(original)
         found = _under(self._surfaces[hit.key], tag, hit, piece)
@@ -163,7 +164,7 @@ class _Reader:
             if not instance.is_instance or instance.parent is None or instance.object.original != original:
                 continue
             if np.allclose(np.array(instance.matrix_world), hit.matrix, atol=SAME_PLACE):
-                return int(instance.parent.original.get(TAG_PROPERTY, UNTAGGED))
+                return whole_number(instance.parent.original, TAG_PROPERTY)
         return UNTAGGED
 
     def _own(self, original: Any) -> _Surface:

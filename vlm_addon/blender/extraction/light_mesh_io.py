@@ -18,13 +18,12 @@ from ..names import (
     COLOR_ATTRIBUTE,
     DYNAMIC_PROPERTY,
     EMISSION_ATTRIBUTE,
-    HUE_PROPERTY,
     SCHEMA_PROPERTY,
     SCHEMA_VERSION,
-    STRENGTH_PROPERTY,
     TAG_ATTRIBUTE,
     is_light_mesh,
 )
+from ..stored_values import factors, whole_number
 from ..tagging.stored_links import read_links
 from .color_space import into_rec709, working_to_rec709
 from .dynamics import is_dynamic
@@ -82,7 +81,7 @@ def extract(options: ExtractOptions | None = None, depsgraph: Any = None, broken
     """
     options = options or ExtractOptions()
     snapshot, lights, report = evaluate(
-        lambda graph: _both(graph, options), options.viewport_levels, depsgraph, light_meshes=True
+        lambda graph: _both(graph, options, broken_values), options.viewport_levels, depsgraph, light_meshes=True
     )
     light_mesh = _with_source_points(lights, snapshot, options, report, broken_values)
     findings = dict.fromkeys((*snapshot.findings, *report.findings))
@@ -109,9 +108,11 @@ def extract_light_mesh(
     return _with_source_points(lights, snapshot, options, report)
 
 
-def _both(depsgraph: Any, options: ExtractOptions) -> tuple[SceneSnapshot, list[_Read], FindingList]:
+def _both(
+    depsgraph: Any, options: ExtractOptions, broken_values: bool
+) -> tuple[SceneSnapshot, list[_Read], FindingList]:
     report = FindingList()
-    return extract_from(depsgraph, options), _read_light_meshes(depsgraph, report), report
+    return extract_from(depsgraph, options), _read_light_meshes(depsgraph, report, broken_values), report
 
 
 def origins_of(thing: Any) -> LightOrigins:
@@ -149,7 +150,7 @@ def _with_source_points(
     return found
 
 
-def _read_light_meshes(depsgraph: Any, report: FindingList) -> list[_Read]:
+def _read_light_meshes(depsgraph: Any, report: FindingList, broken_values: bool = False) -> list[_Read]:
     """The light meshes of a depsgraph, one per object or instance, without source points."""
     to_rec709 = working_to_rec709()
     found, seen = [], set()
@@ -157,10 +158,10 @@ def _read_light_meshes(depsgraph: Any, report: FindingList) -> list[_Read]:
         if is_light_mesh(instance.object) and instance.object.type == "MESH":
             seen.add(instance.object.name_full)
             matrix = np.array(instance.matrix_world, np.float64)
-            found.append(_read_object(instance.object, matrix, to_rec709, report))
+            found.append(_read_object(instance.object, matrix, to_rec709, report, broken_values))
     for blender_object in _left_out(depsgraph, seen, report):
         matrix = np.array(blender_object.matrix_world, np.float64)
-        found.append(_read_object(blender_object, matrix, to_rec709, report))
+        found.append(_read_object(blender_object, matrix, to_rec709, report, broken_values))
     return [each for each in found if len(each.lights)]
 
 
@@ -180,21 +181,29 @@ def _left_out(depsgraph: Any, seen: set[str], report: FindingList) -> Iterator[A
         yield evaluated
 
 
-def _read_object(blender_object: Any, matrix: Float64, to_rec709: Float64, report: FindingList) -> _Read:
+def _read_object(
+    blender_object: Any, matrix: Float64, to_rec709: Float64, report: FindingList, broken_values: bool
+) -> _Read:
     owner = f"light mesh {blender_object.name!r}"
-    version = blender_object[SCHEMA_PROPERTY]
+    version = whole_number(blender_object, SCHEMA_PROPERTY)
     if not 1 <= version <= SCHEMA_VERSION:
         problem = f"{SCHEMA_PROPERTY} is {version}, not 1 to {SCHEMA_VERSION}"
         raise InvalidInput(owner, problem, "open it with the version of the extension that wrote it")
     mesh = blender_object.to_mesh()
     try:
-        return _read_lights(blender_object, mesh, matrix, owner, to_rec709, report)
+        return _read_lights(blender_object, mesh, matrix, owner, to_rec709, report, broken_values)
     finally:
         blender_object.to_mesh_clear()
 
 
 def _read_lights(
-    blender_object: Any, mesh: Any, matrix: Float64, owner: str, to_rec709: Float64, report: FindingList
+    blender_object: Any,
+    mesh: Any,
+    matrix: Float64,
+    owner: str,
+    to_rec709: Float64,
+    report: FindingList,
+    broken_values: bool,
 ) -> _Read:
     local = read_mesh(mesh, owner)
     if not len(local.triangles):
@@ -209,13 +218,13 @@ def _read_lights(
     area_scale = face_attribute(mesh, AREA_SCALE_ATTRIBUTE, "FLOAT")
     area_scale = np.ones(count, np.float32) if area_scale is None else area_scale
     tags = face_attribute(mesh, TAG_ATTRIBUTE, "INT")
-    hue = np.array(blender_object.get(HUE_PROPERTY, WHITE), np.float32)[:3]
-    strength = np.float32(blender_object.get(STRENGTH_PROPERTY, 1.0))
+    strength, hue = factors(blender_object, broken_values)
     original = blender_object.original
 
     def tinted(values: np.ndarray | None) -> Float32:
         rgb = np.zeros((count, 3), np.float32) if values is None else values[:, :3]
-        return into_rec709(rgb * hue, to_rec709)[local.faces]
+        with np.errstate(invalid="ignore", over="ignore"):  # what cannot be is found by the check
+            return into_rec709(rgb * hue.astype(np.float32), to_rec709)[local.faces]
 
     mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
     lights = len(local.triangles)
@@ -225,9 +234,9 @@ def _read_lights(
         triangles=flipped(local.triangles) if mirrored else local.triangles,
         colour=tinted(color),
         emission=tinted(emission),
-        strength=strength * area_scale[local.faces],
+        strength=np.float32(strength) * area_scale[local.faces],
         tag_ids=(np.zeros(count, np.int32) if tags is None else tags)[local.faces],
-        dynamic=np.full(lights, bool(blender_object.get(DYNAMIC_PROPERTY, False)) or is_dynamic(original)),
+        dynamic=np.full(lights, bool(whole_number(blender_object, DYNAMIC_PROPERTY)) or is_dynamic(original)),
         samples=unsampled(lights),
         links=read_links(blender_object),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from ...core.errors import InvalidInput
 from ...core.scene import Float32, Float64, Int32, Mesh
 from ..names import TAG_PROPERTY
+from ..stored_values import whole_number
 from .color_space import into_rec709
 from .dynamics import is_dynamic
 from .materials import FindingList, MaterialTable, MaterialUse
@@ -206,7 +207,7 @@ def _key(blender_object: Any) -> tuple[str, int]:
 
 def _tags(instance: Any, local: LocalMesh) -> Int32:
     """Tag of each triangle: the face's where it has one, else the object's, else the instancer's."""
-    own = int(instance.object.get(TAG_PROPERTY, 0))
+    own = whole_number(instance.object, TAG_PROPERTY)
     if not own and instance.is_instance and instance.parent is not None:
-        own = int(instance.parent.get(TAG_PROPERTY, 0))
+        own = whole_number(instance.parent, TAG_PROPERTY)
     return np.where(local.face_tags != 0, local.face_tags, own).astype(np.int32)

@@ -10,6 +10,7 @@ import numpy as np
 from ...core.scene import Float64, Int32
 from ..extraction.mesh_arrays import read
 from ..names import MORE_DETAIL_GROUP, NO_LIGHTS_GROUP
+from ..stored_values import text
 from .surface_transfer import interpolated, vertex_weights
 
 PREFIX = "Follow: "
@@ -79,7 +80,7 @@ def remove_rig(thing: Any) -> None:
     """Take away what `copy_rig` and a binding to the surface made; the basis stays."""
     for modifier in [m for m in thing.modifiers if m.name.startswith(PREFIX)]:
         thing.modifiers.remove(modifier)
-    for name in str(thing.get(GROUPS_PROPERTY, "")).split("\n"):
+    for name in text(thing, GROUPS_PROPERTY).split("\n"):
         if name in thing.vertex_groups:
             thing.vertex_groups.remove(thing.vertex_groups[name])
     if GROUPS_PROPERTY in thing:

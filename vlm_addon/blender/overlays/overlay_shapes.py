@@ -25,12 +25,11 @@ from ..light_geometry import LightFaces, light_faces_in_world
 from ..names import (
     COLOR_ATTRIBUTE,
     EMISSION_ATTRIBUTE,
-    HUE_PROPERTY,
-    STRENGTH_PROPERTY,
     TAG_ATTRIBUTE,
     TAG_PROPERTY,
     is_light_mesh,
 )
+from ..stored_values import factors, whole_number
 
 NONE, COLOR, EMISSION, TAGS = "NONE", "COLOR", "EMISSION", "TAGS"
 UNTAGGED_COLOR = (0.35, 0.35, 0.35)
@@ -90,8 +89,7 @@ def fill_shape(thing: Any, faces: LightFaces, fill: str, alpha: float) -> Shape:
         colors = np.where((tags != UNTAGGED)[:, None], tag_colors(tags), UNTAGGED_COLOR)
     else:
         stored = read_faces(thing, EMISSION_ATTRIBUTE if fill == EMISSION else COLOR_ATTRIBUTE)[:, :3]
-        hue = np.array(thing.get(HUE_PROPERTY, (1.0, 1.0, 1.0)), np.float32)[:3]
-        factor = float(thing.get(STRENGTH_PROPERTY, 1.0))
+        factor, hue = factors(thing)
         colors = hdr_colors(factor * convert(stored * hue, working_to_rec709()))
     return triangles(faces.corners, colors[faces.faces], alpha)
 
@@ -137,9 +135,9 @@ def tagged_surface_shapes(depsgraph: Any, alpha: float) -> Iterator[Shape]:
         thing = instance.object
         if thing.type != "MESH" or is_light_mesh(thing) or not instance.show_self:
             continue
-        own = int(thing.get(TAG_PROPERTY, UNTAGGED))
+        own = whole_number(thing, TAG_PROPERTY)
         if own == UNTAGGED and instance.is_instance and instance.parent is not None:
-            own = int(instance.parent.get(TAG_PROPERTY, UNTAGGED))
+            own = whole_number(instance.parent, TAG_PROPERTY)
         if own == UNTAGGED and TAG_ATTRIBUTE not in thing.data.attributes and thing.mode != "EDIT":
             continue
         corners, tags = _tagged_faces(thing, np.array(instance.matrix_world, np.float64), own)
