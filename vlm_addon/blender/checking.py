@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.bake_key import surface_hashes
 from ..core.progress import Progress
 from ..core.scene import Finding
 from ..light_grid_bake import check_lights
@@ -15,6 +16,7 @@ from .extraction.light_mesh_io import Extraction, LightOrigins, extract
 from .findings import list_findings
 from .following import animation
 from .light_grid_options import scene_grid_settings
+from .source_changes import changed_sources
 
 
 @dataclass(frozen=True)
@@ -28,15 +30,16 @@ class Checked:
 
 def check(context: Any) -> Callable[[Progress], Checked]:
     """Work that looks for what is wrong with the light meshes and the light grid of the scene, and what extraction had
-    to approximate."""
+    to approximate: first what has become of the sources, which is often why the rest is wrong."""
     found = extract_edited(context)
+    causes = changed_sources(context.scene, surface_hashes(found.snapshot.meshes))
     settings = scene_grid_settings(context.scene)
     budget = over_budget(context.scene, len(found.light_mesh or ()))
     notes = (*budget, *animation.left_behind(context.scene), *found.snapshot.findings)
 
     def work(progress: Progress) -> Checked:
         findings = check_lights(found.snapshot, found.light_mesh, settings, progress)
-        return Checked(found.snapshot.name, (*findings, *notes), found.origins)
+        return Checked(found.snapshot.name, (*causes, *findings, *notes), found.origins)
 
     return work
 
