@@ -14,6 +14,7 @@ from vlm_addon.blender.overlays.overlay_shapes import (
     COLOR,
     EMISSION,
     TAGS,
+    depths_below,
     fill_shape,
     finding_shapes,
     half_ball_shape,
@@ -193,3 +194,29 @@ def test_only_what_changed_is_made_anew(make_lights, make_plane):
     key = drawing._surface_key(bpy.context.scene)
     plane["vlm_tag"] = 3
     assert drawing._surface_key(bpy.context.scene) != key
+
+
+def test_lights_come_as_much_nearer_as_they_lie_below_their_surface(make_mesh, make_plane):
+    """A square 0.03 m below a plane, one 0.05 m above it that is turned over, and one with nothing near."""
+    make_plane(size=20.0)
+    squares = [[(x, y, z) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))] for z in (-0.03, 0.05, 5.0)]
+    corners = [(x + 2 * row, y, z) for row, square in enumerate(squares) for x, y, z in square]
+    thing = make_mesh("lights", corners, [(0, 1, 2, 3), (7, 6, 5, 4), (8, 9, 10, 11)])
+    thing["vlm_schema"] = 2
+    bpy.context.view_layer.update()
+    faces = faces_of(thing)
+    depths = depths_below(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), faces)
+    for face, depth in enumerate((0.03, 0.05, 0.0)):
+        assert depths[faces.faces == face] == pytest.approx(depth, abs=1e-6)
+    assert fill_shape(thing, faces, COLOR, 1.0, depths).nearer.reshape(-1, 3)[:, 0] == pytest.approx(depths, abs=1e-6)
+
+
+def test_a_light_under_a_bulge_comes_out_in_its_middle(make_mesh, make_plane):
+    """The surface is a pyramid 0.2 m high over a square, the light its base."""
+    corners = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (0, 0, 0.2)]
+    make_mesh("bulge", corners, [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
+    thing = make_mesh("lights", corners[:3], [(0, 1, 2)])
+    thing["vlm_schema"] = 2
+    bpy.context.view_layer.update()
+    (depth,) = depths_below(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), faces_of(thing))
+    assert depth == pytest.approx(0.2 * (1.0 - 1.0 / 3.0), rel=1e-4), "over the middle of the light"

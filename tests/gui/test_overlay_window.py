@@ -1,69 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Overlays in Blender's own window: drive_overlays.py switches them on, the tests look at the pixels.
 
-Blender is found as for test_window.py; VLM_SCREENSHOTS names a folder that keeps the screenshots.
+Blender is found as blender_window.py says.
 """
-
-import json
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from test_window import ROOT, command, pixels
+from tests.gui.blender_window import assert_ended_well, pixels
 
 pytestmark = pytest.mark.full
 
-MINUTES = 4
-DRIVE = Path(__file__).with_name("drive_overlays.py")
-
-
-@pytest.fixture(scope="module")
-def story(tmp_path_factory):
-    """What drive_overlays.py wrote, with `folder` and `output` added."""
-    chroot = os.environ.get("VLM_BLENDER_CHROOT")
-    if not chroot and not (shutil.which("blender") and shutil.which("xvfb-run") and shutil.which("import")):
-        pytest.skip("no Blender with a window: set VLM_BLENDER_CHROOT, or install blender, xvfb and imagemagick")
-    folder = tmp_path_factory.mktemp("overlays")
-    outside = Path(tempfile.mkdtemp(prefix="vlm-overlays-", dir=f"{chroot}/root")) if chroot else folder / "blender"
-    outside.mkdir(exist_ok=True)
-    inside = Path("/root") / outside.name if chroot else outside
-    try:
-        subprocess.run([sys.executable, ROOT / "tools" / "package.py", "--output", outside], check=True)
-        (package,) = outside.glob("*-linux_x64.zip")
-        shutil.copy(DRIVE, outside / "drive.py")
-        done = subprocess.run(
-            command(chroot, inside, package.name), capture_output=True, text=True, timeout=60 * MINUTES
-        )
-        if not (outside / "story.json").exists():
-            pytest.fail(f"Blender ended early:\n{done.stdout}{done.stderr}")
-        for path in (*outside.glob("*.png"), outside / "story.json"):
-            shutil.copy(path, folder)
-    finally:
-        if chroot:
-            shutil.rmtree(outside)
-    keep = os.environ.get("VLM_SCREENSHOTS")
-    if keep:
-        shutil.copytree(folder, keep, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.json", "blender"))
-    return {**json.loads((folder / "story.json").read_text()), "folder": folder, "output": done.stdout + done.stderr}
+DRIVER = "overlays"
+MINUTES = 6
+STRIPE_PIXELS = 6
+"""Width of the stripes on backs, as overlay_paint.py and overlay_drawing.py draw them."""
 
 
 def middle(story, name):
     """Mean colour around the middle of the 3D view, where the ball is, (3,) in [0, 1]."""
+    return patch(story, name).mean(axis=(0, 1))
+
+
+def patch(story, name):
+    """What is shown there, (40, 60, 3)."""
+    return pixels(story["folder"] / f"{name}.png")[400:440, 580:640]
+
+
+def inner_ball(story, name):
+    """Pixels, (n, 3), of the ball but for its rim, before which flat lights do not reach."""
     shown = pixels(story["folder"] / f"{name}.png")
-    return shown[400:440, 580:640].mean(axis=(0, 1))
+    x, y, radius = story["ball"]
+    rows, columns = np.indices(shown.shape[:2])
+    return shown[(rows - y) ** 2 + (columns - x) ** 2 < (0.8 * radius) ** 2]
 
 
 def test_the_story_came_to_its_end_without_a_message(story):
-    assert "error" not in story, story["error"]
-    assert story["finished"]
-    assert "Traceback" not in story["output"], story["output"]
+    assert_ended_well(story)
     assert story["created"] == story["grid"] == ["FINISHED"]
 
 
@@ -81,12 +54,31 @@ def test_lights_show_their_colour_and_nothing_is_left_when_off(story):
     assert np.ptp(middle(story, "off")) < 0.2, "without overlays the ball is gray"
 
 
+def test_the_fill_has_no_gaps_although_lights_lie_behind_what_is_visible(story):
+    """The ball's faces bulge before the flat lights that stand for them."""
+    red, green, blue = inner_ball(story, "color").T
+    assert len(red) > 10000
+    assert (red > np.maximum(green, blue) + 0.3).mean() > 0.995
+
+
 def test_tags_show_colours_of_their_own(story):
     assert np.abs(middle(story, "tags") - middle(story, "color")).max() > 0.2
 
 
 def test_lights_that_are_turned_away_show_their_dark_striped_back_in_edit_mode(story):
     assert middle(story, "turned_edit")[0] < middle(story, "color")[0] - 0.2
+    shown = patch(story, "turned_edit")
+    black, dark_red = shown.max(axis=2) < 0.1, (shown[..., 0] > 0.2) & (shown[..., 1:].max(axis=2) < 0.15)
+    assert 0.3 < black.mean() < 0.7
+    assert 0.2 < dark_red.mean() < 0.7
+    assert (black | dark_red).mean() > 0.8, "outlines and lines to the shining side apart, all are stripes"
+
+
+def test_stripes_are_as_wide_as_they_are_meant(story):
+    """Along a row they change every STRIPE_PIXELS pixels."""
+    black = patch(story, "turned_edit").max(axis=2) < 0.1
+    lengths = [len(run) for row in black for run in "".join("#" if each else " " for each in row).split()]
+    assert np.median(lengths) == STRIPE_PIXELS
 
 
 def test_a_slice_of_the_light_grid_stands_out_of_the_ball_in_blue(story):

@@ -10,7 +10,6 @@ from typing import Any
 import bpy
 import numpy as np
 import numpy.typing as npt
-from mathutils import Matrix
 
 from ...core.errors import VlmError
 from ...core.grid_samples import Cells, GridView, cells_around, look, slice_cells
@@ -19,11 +18,14 @@ from ...core.scene import Float64
 from ..light_grid_options import scene_grid_settings
 from ..light_meshes import light_meshes
 from ..names import HUE_PROPERTY, STRENGTH_PROPERTY, TAG_PROPERTY, is_light_mesh
+from ..stored_values import plain
+from .overlay_paint import Painter, as_batch
 from .overlay_shapes import (
     NONE,
     TAGS,
     Shape,
     cell_shapes,
+    depths_below,
     fill_shape,
     finding_shapes,
     half_ball_shape,
@@ -34,9 +36,11 @@ from .overlay_shapes import (
 
 Bools = npt.NDArray[np.bool_]
 
-LINE_PIXELS = 1.5
-NEARER = 0.02
-"""Share of their distance by which overlays are drawn nearer to the eye: lights lie behind what is visible."""
+NEARER = 0.002
+"""Share of their distance by which lights come nearer to the eye, beside how deep they lie: they are behind what is
+visible."""
+STEEPNESS = 2.0
+"""Ways along the line of sight for each metre of depth: surfaces are seen at slopes."""
 SURFACE_NEARER = 0.001
 STRIPE_PIXELS = 6.0
 CURSOR_REACH = 2
@@ -45,32 +49,13 @@ LABEL_SIZE = 12
 TAGGED_SURFACES, GRID = "tagged surfaces", "light grid"
 AXES = {"X": 0, "Y": 1, "Z": 2}
 
-_VERTEX = """
-void main() {
-    shade = color;
-    gl_Position = matrix * vec4(pos, 1.0);
-}
-"""
-# Backs are striped and darker: lights shine on their front only. The 3D view takes linear values.
-_FRAGMENT = """
-void main() {
-    vec3 linear = mix(shade.rgb / 12.92, pow((shade.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, shade.rgb));
-    bool is_stripe = mod(gl_FragCoord.x + gl_FragCoord.y, 2.0 * stripe) < stripe;
-    if (!gl_FrontFacing && stripe > 0.0) {
-        result = is_stripe ? vec4(0.0, 0.0, 0.0, shade.a) : vec4(0.2 * linear, 0.5 * shade.a);
-    } else {
-        result = vec4(linear, shade.a);
-    }
-}
-"""
-
 
 @dataclass(frozen=True)
 class _Part:
-    """key: of all that the shapes depend on. batches: (is lines, batch) in order."""
+    """key: of all that the shapes depend on. batches: (is lines, batch, most metres nearer to the eye) in order."""
 
     key: Any
-    batches: list[tuple[bool, Any]]
+    batches: list[tuple[bool, Any, float]]
 
 
 class OverlayDrawing:
@@ -78,7 +63,7 @@ class OverlayDrawing:
 
     def __init__(self) -> None:
         self._handles: list[Any] = []
-        self._shader: Any = None
+        self._painter = Painter()
         self._parts: dict[str, _Part] = {}
         self._changes: dict[tuple[str, str], int] = {}
         self._surface_changes = 0
@@ -96,7 +81,7 @@ class OverlayDrawing:
         for handle in self._handles:
             bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
         self._handles = []
-        self._shader = None
+        self._painter = Painter()
         self.forget()
 
     def forget(self, with_grids: bool = False) -> None:
@@ -153,15 +138,20 @@ class OverlayDrawing:
         depth_test = "NONE" if settings.in_front else "LESS_EQUAL"
         depsgraph = context.evaluated_depsgraph_get()
         shown: set[str] = set()
+        lights: list[_Part] = []
         for thing in light_meshes(context.scene):
             if thing.visible_get():
                 part = self._light_mesh_part(thing, depsgraph, settings, context.scene)
                 shown.add(thing.name)
-                self._paint(gpu, context, part, depth_test, NEARER, STRIPE_PIXELS if settings.sides else 0.0)
+                lights.append(part)
         if settings.fill == TAGS:
             part = self._part(TAGGED_SURFACES, self._surface_key(context.scene), self._surfaces(depsgraph, settings))
             shown.add(TAGGED_SURFACES)
             self._paint(gpu, context, part, "LESS_EQUAL", SURFACE_NEARER, 0.0)
+        if not settings.in_front:
+            self._write_depths(gpu, context, lights)
+        for part in lights:
+            self._paint(gpu, context, part, depth_test, NEARER, STRIPE_PIXELS if settings.sides else 0.0)
         if settings.grid and self.grid_of(context.scene) is not None:
             part = self._grid_part(context.scene, settings)
             shown.add(GRID)
@@ -171,21 +161,33 @@ class OverlayDrawing:
         gpu.state.depth_test_set("NONE")
         gpu.state.blend_set("NONE")
 
+    def _write_depths(self, gpu: Any, context: Any, parts: Iterable[_Part]) -> None:
+        """So that of lights behind each other the nearest alone is seen: they come nearer than what hides the rest."""
+        written = gpu.state.depth_mask_get()
+        gpu.state.depth_mask_set(True)
+        gpu.state.color_mask_set(False, False, False, False)
+        for part in parts:
+            self._paint(gpu, context, part, "LESS_EQUAL", NEARER, 0.0, with_lines=False)
+        gpu.state.color_mask_set(True, True, True, True)
+        gpu.state.depth_mask_set(written)
+
     def _light_mesh_part(self, thing: Any, depsgraph: Any, settings: Any, scene: Any) -> _Part:
         reach = reach_of(scene) if settings.half_balls and _is_chosen(thing) else None
         marks = _marks(scene) if settings.findings else ()
         changes = [self._changes.get(("Object", thing.name), 0), self._changes.get(("Mesh", thing.data.name), 0)]
         looks = (settings.fill, settings.sides, settings.opacity, reach, marks)
-        own = (_plain(thing.get(STRENGTH_PROPERTY)), _plain(thing.get(HUE_PROPERTY)), thing.mode)
+        own = (repr(plain(thing.get(STRENGTH_PROPERTY))), repr(plain(thing.get(HUE_PROPERTY))), thing.mode)
         key = (*changes, *looks, *own, tuple(map(tuple, thing.matrix_world)))
 
         def shapes() -> list[Shape]:
             faces = world_faces(thing, depsgraph)
-            found = [fill_shape(thing, faces, settings.fill, settings.opacity)] if settings.fill != NONE else []
+            nearer = STEEPNESS * depths_below(scene, depsgraph, faces)
+            fill, alpha = settings.fill, settings.opacity
+            found = [fill_shape(thing, faces, fill, alpha, nearer)] if fill != NONE else []
             if settings.sides:
-                found += side_shapes(faces)
+                found += side_shapes(faces, float(nearer.max(initial=0.0)))
             if settings.findings:
-                found += finding_shapes(scene, thing, faces, settings.opacity)
+                found += finding_shapes(scene, thing, faces, alpha, nearer)
             if reach is not None:
                 found.append(half_ball_shape(thing, faces, reach))
             return found
@@ -193,7 +195,9 @@ class OverlayDrawing:
         return self._part(thing.name, key, shapes)
 
     def _surface_key(self, scene: Any) -> Any:
-        tags = tuple((thing.name, thing.get(TAG_PROPERTY)) for thing in scene.objects if TAG_PROPERTY in thing)
+        tags = tuple(
+            (thing.name, repr(plain(thing.get(TAG_PROPERTY)))) for thing in scene.objects if TAG_PROPERTY in thing
+        )
         return self._surface_changes, tags, bpy.context.mode
 
     def _surfaces(self, depsgraph: Any, settings: Any) -> Callable[[], Iterable[Shape]]:
@@ -215,69 +219,27 @@ class OverlayDrawing:
                 found = list(shapes())
             except VlmError:
                 found = []  # Check says what is wrong; a message with every redraw would help nobody
-            self._parts[name] = _Part(key, [self._batch(shape) for shape in found if len(shape.positions)])
+            self._parts[name] = _Part(key, [as_batch(shape) for shape in found if len(shape.positions)])
         return self._parts[name]
 
-    def _batch(self, shape: Shape) -> tuple[bool, Any]:
-        import gpu
-
-        form = gpu.types.GPUVertFormat()
-        form.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
-        form.attr_add(id="color", comp_type="F32", len=4, fetch_mode="FLOAT")
-        buffer = gpu.types.GPUVertBuf(format=form, len=len(shape.positions))
-        buffer.attr_fill("pos", shape.positions)
-        buffer.attr_fill("color", shape.colors)
-        return shape.is_lines, gpu.types.GPUBatch(type="LINES" if shape.is_lines else "TRIS", buf=buffer)
-
-    def _face_shader(self) -> Any:
-        import gpu
-
-        if self._shader is None:
-            between = gpu.types.GPUStageInterfaceInfo("vlm_overlay_shade")
-            between.smooth("VEC4", "shade")
-            info = gpu.types.GPUShaderCreateInfo()
-            info.push_constant("MAT4", "matrix")
-            info.push_constant("FLOAT", "stripe")
-            info.vertex_in(0, "VEC3", "pos")
-            info.vertex_in(1, "VEC4", "color")
-            info.vertex_out(between)
-            info.fragment_out(0, "VEC4", "result")
-            info.vertex_source(_VERTEX)
-            info.fragment_source(_FRAGMENT)
-            self._shader = gpu.shader.create_from_info(info)
-        return self._shader
-
-    def _paint(self, gpu: Any, context: Any, part: _Part, depth_test: str, nearer: float, stripe: float) -> None:
-        """stripe: width of the stripes on backs in pixels, 0 for backs that look like fronts."""
+    def _paint(
+        self,
+        gpu: Any,
+        context: Any,
+        part: _Part,
+        depth_test: str,
+        share: float,
+        stripe: float,
+        with_lines: bool = True,
+    ) -> None:
+        """share: of their distance by which all come nearer to the eye, beside what each face needs by itself.
+        stripe: width of the stripes on backs in pixels, 0 for backs that look like fronts."""
         gpu.state.depth_test_set(depth_test)
-        projection, view = gpu.matrix.get_projection_matrix(), gpu.matrix.get_model_view_matrix()
-        moved = _nearer(context.region_data, nearer) @ view
-        for is_lines, batch in part.batches:
-            if is_lines:
-                self._paint_lines(gpu, context, batch, moved)
-            elif stripe > 0.0:
-                # Backs stay where they are: nearer, those at the rim of a body would show through its front.
-                self._paint_faces(gpu, batch, projection @ view, stripe, "FRONT")
-                self._paint_faces(gpu, batch, projection @ moved, stripe, "BACK")
-            else:
-                self._paint_faces(gpu, batch, projection @ moved, stripe, "NONE")
-
-    def _paint_lines(self, gpu: Any, context: Any, batch: Any, view: Matrix) -> None:
-        with gpu.matrix.push_pop():
-            gpu.matrix.load_matrix(view)
-            shader = gpu.shader.from_builtin("POLYLINE_FLAT_COLOR")
-            shader.uniform_float("viewportSize", (context.region.width, context.region.height))
-            shader.uniform_float("lineWidth", LINE_PIXELS * context.preferences.system.pixel_size)
-            batch.draw(shader)
-
-    def _paint_faces(self, gpu: Any, batch: Any, matrix: Matrix, stripe: float, left_out: str) -> None:
-        """left_out: the side that is not drawn."""
-        shader = self._face_shader()
-        shader.uniform_float("matrix", matrix)
-        shader.uniform_float("stripe", stripe)
-        gpu.state.face_culling_set(left_out)
-        batch.draw(shader)
-        gpu.state.face_culling_set("NONE")
+        for is_lines, batch, metres in part.batches:
+            if not is_lines:
+                self._painter.faces(context.region_data, batch, share, stripe)
+            elif with_lines:
+                self._painter.lines(context, batch, share, metres)
 
     def _label(self) -> None:
         """Numbers in the cells next to the 3D cursor."""
@@ -316,13 +278,6 @@ def cell_text(cells: Cells, row: int) -> str:
     return f"{int(cells.counts[row]):,}" if cells.errors is None else f"{cells.errors[row]:.1%}"
 
 
-def _nearer(region_data: Any, share: float) -> Matrix:
-    """What takes view space nearer to the eye by a share of the distance, so that pixels stay where they are."""
-    if region_data.window_matrix[3][3] == 0.0:
-        return Matrix.Diagonal((1.0 - share, 1.0 - share, 1.0 - share, 1.0))
-    return Matrix.Translation((0.0, 0.0, share * region_data.view_distance))
-
-
 def _is_chosen(thing: Any) -> bool:
     return bool(thing.mode == "EDIT" or thing.select_get())
 
@@ -338,7 +293,3 @@ def reach_of(scene: Any) -> float | None:
 
 def _marks(scene: Any) -> Any:
     return tuple((mark.owner, mark.faces) for item in scene.vlm.findings for mark in item.marks)
-
-
-def _plain(value: Any) -> Any:
-    return tuple(value) if hasattr(value, "__len__") else value

@@ -17,6 +17,7 @@ from ...core.grid_samples import Cells
 from ...core.mesh_topology import unit_normals
 from ...core.overlay_lines import box_lines, half_ball_lines, normal_lines, outlines
 from ...core.scene import UNTAGGED, Float32, Float64, Int32
+from ..drawing.draw_surfaces import surface_under
 from ..extraction.color_space import convert, working_to_rec709
 from ..extraction.mesh_arrays import face_attribute, flipped, read
 from ..findings import marked_faces
@@ -40,28 +41,71 @@ BOX_SHARE = 0.85
 """Of a cell's edges that its box has, so that neighbours' do not cover each other."""
 MOST_HALF_BALLS = 200
 """More cannot be told apart."""
+MOST_SOUNDED = 500
+"""Triangles of which corners are asked for how deep they lie, too: each takes some microseconds."""
+REACH_SHARE = 0.5
+"""Of a light's size within which its surface is looked for."""
+DRAWN_IN = 0.9
 
 
 @dataclass(frozen=True)
 class Shape:
-    """positions: (n, 3) float32 m, three for each triangle or two for each line. colors: (n, 4) float32 sRGB."""
+    """positions: (n, 3) float32 m, three for each triangle or two for each line. colors: (n, 4) float32 sRGB.
+
+    nearer: (n,) float32 m, how far it has to come towards the eye to be seen before what it stands for.
+    """
 
     is_lines: bool
     positions: Float32
     colors: Float32
+    nearer: Float32
 
 
-def triangles(corners: Float64, colors: npt.ArrayLike, alpha: float) -> Shape:
-    """corners: (t, 3, 3). colors: (t, 3) sRGB."""
+def triangles(corners: Float64, colors: npt.ArrayLike, alpha: float, nearer: npt.ArrayLike = 0.0) -> Shape:
+    """corners: (t, 3, 3). colors: (t, 3) sRGB. nearer: (t,) m, or one for all."""
     rgba = np.full((len(corners), 4), alpha, np.float32)
     rgba[:, :3] = colors
-    return Shape(False, np.ascontiguousarray(corners.reshape(-1, 3), np.float32), np.repeat(rgba, 3, axis=0))
+    places = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
+    metres = np.broadcast_to(np.asarray(nearer, np.float32), (len(corners),))
+    return Shape(False, places, np.repeat(rgba, 3, axis=0), np.repeat(metres, 3))
 
 
-def lines(ends: Float64, colors: npt.ArrayLike) -> Shape:
-    """ends: (l, 2, 3). colors: (4,) of all, or (l, 4)."""
+def lines(ends: Float64, colors: npt.ArrayLike, nearer: float = 0.0) -> Shape:
+    """ends: (l, 2, 3). colors: (4,) of all, or (l, 4). nearer: m."""
     rgba = np.broadcast_to(np.asarray(colors, np.float32), (len(ends), 4))
-    return Shape(True, np.ascontiguousarray(ends.reshape(-1, 3), np.float32), np.repeat(rgba, 2, axis=0))
+    places = np.ascontiguousarray(ends.reshape(-1, 3), np.float32)
+    return Shape(True, places, np.repeat(rgba, 2, axis=0), np.full(len(places), nearer, np.float32))
+
+
+def depths_below(scene: Any, depsgraph: Any, faces: LightFaces) -> Float64:
+    """(t,) m: how deep each triangle lies below the visible surface that it stands for, or above it; 0 without one.
+
+    Measured along its normal where its surface is farthest: in the middle over bulges, at the corners over hollows.
+    """
+    corners = faces.corners
+    middles = corners.mean(axis=1)
+    places = [middles] if len(corners) > MOST_SOUNDED else [middles, *np.moveaxis(_drawn_in(corners, middles), 1, 0)]
+    reach = REACH_SHARE * np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1, initial=0.0)
+    normals = unit_normals(corners)
+    found = np.zeros(len(corners))
+    for row in np.flatnonzero(reach > 0.0):
+        for place in places:
+            found[row] = max(found[row], _depth(scene, depsgraph, place[row], normals[row], float(reach[row])))
+    return found
+
+
+def _drawn_in(corners: Float64, middles: Float64) -> Float64:
+    """Corners a little inside of their triangle: rays from its rim may pass its surface by."""
+    return middles[:, None] + DRAWN_IN * (corners - middles[:, None])
+
+
+def _depth(scene: Any, depsgraph: Any, place: Float64, normal: Float64, reach: float) -> float:
+    """m from a point of a light to its surface; that of a light that is inside out faces the other way."""
+    for sign in (1.0, -1.0):
+        hit = surface_under(scene, depsgraph, place, normal, reach, sign)
+        if hit is not None:
+            return float(abs((hit.location - place) @ normal))
+    return 0.0
 
 
 def world_faces(thing: Any, depsgraph: Any) -> LightFaces:
@@ -82,8 +126,11 @@ def world_faces(thing: Any, depsgraph: Any) -> LightFaces:
     return LightFaces(places[rows], faces, len(edited.faces))
 
 
-def fill_shape(thing: Any, faces: LightFaces, fill: str, alpha: float) -> Shape:
-    """The lights of one light mesh in their colours, in what they send out by themselves, or in those of their tags."""
+def fill_shape(thing: Any, faces: LightFaces, fill: str, alpha: float, nearer: npt.ArrayLike = 0.0) -> Shape:
+    """The lights of one light mesh in their colours, in what they send out by themselves, or in those of their tags.
+
+    nearer: (t,) m; see `depths_below`.
+    """
     if fill == TAGS:
         tags = read_faces(thing, TAG_ATTRIBUTE)
         colors = np.where((tags != UNTAGGED)[:, None], tag_colors(tags), UNTAGGED_COLOR)
@@ -91,15 +138,15 @@ def fill_shape(thing: Any, faces: LightFaces, fill: str, alpha: float) -> Shape:
         stored = read_faces(thing, EMISSION_ATTRIBUTE if fill == EMISSION else COLOR_ATTRIBUTE)[:, :3]
         factor, hue = factors(thing)
         colors = hdr_colors(factor * convert(stored * hue, working_to_rec709()))
-    return triangles(faces.corners, colors[faces.faces], alpha)
+    return triangles(faces.corners, colors[faces.faces], alpha, nearer)
 
 
-def side_shapes(faces: LightFaces) -> list[Shape]:
-    """Outlines of the faces and a line towards the side that shines."""
+def side_shapes(faces: LightFaces, nearer: float = 0.0) -> list[Shape]:
+    """Outlines of the faces and a line towards the side that shines. nearer: m."""
     normals, areas = _normals(faces)
     return [
-        lines(outlines(faces.corners, faces.faces), LINE_COLOR),
-        lines(normal_lines(faces.middles, normals, areas), NORMAL_COLOR),
+        lines(outlines(faces.corners, faces.faces), LINE_COLOR, nearer),
+        lines(normal_lines(faces.middles, normals, areas), NORMAL_COLOR, nearer),
     ]
 
 
@@ -114,8 +161,8 @@ def half_ball_shape(thing: Any, faces: LightFaces, reach: float) -> Shape:
     return lines(half_ball_lines(centres, unit_normals(corners), radii), HALF_BALL_COLOR)
 
 
-def finding_shapes(scene: Any, thing: Any, faces: LightFaces, alpha: float) -> list[Shape]:
-    """The faces of one light mesh that the last check named."""
+def finding_shapes(scene: Any, thing: Any, faces: LightFaces, alpha: float, nearer: npt.ArrayLike = 0.0) -> list[Shape]:
+    """The faces of one light mesh that the last check named. nearer: (t,) m."""
     marked = np.zeros(faces.count, bool)
     for item in scene.vlm.findings:
         try:
@@ -124,9 +171,13 @@ def finding_shapes(scene: Any, thing: Any, faces: LightFaces, alpha: float) -> l
             continue  # what was checked is not there any more: nothing to mark
         if rows is not None:
             marked[rows] = True
-    corners = faces.corners[marked[faces.faces]]
-    rims = outlines(corners, faces.faces[marked[faces.faces]])
-    return [triangles(corners, np.tile(FINDING_COLOR[:3], (len(corners), 1)), alpha), lines(rims, FINDING_COLOR)]
+    chosen = marked[faces.faces]
+    corners, metres = faces.corners[chosen], np.broadcast_to(np.asarray(nearer), (len(chosen),))[chosen]
+    rims = outlines(corners, faces.faces[chosen])
+    return [
+        triangles(corners, np.tile(FINDING_COLOR[:3], (len(corners), 1)), alpha, metres),
+        lines(rims, FINDING_COLOR, float(metres.max(initial=0.0))),
+    ]
 
 
 def tagged_surface_shapes(depsgraph: Any, alpha: float) -> Iterator[Shape]:
