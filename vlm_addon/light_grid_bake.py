@@ -14,7 +14,7 @@ from .core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings, LightGr
 from .core.light_grid_error import GridError, grid_error
 from .core.light_mesh import VirtualLightMesh, empty_light_mesh
 from .core.light_scale import PROBES
-from .core.progress import Progress, silent
+from .core.progress import Progress, as_report, part, silent
 from .core.range_grid import RangeGrid
 from .core.scene import Finding, Float64, SceneSnapshot
 from .core.surface_points import random_surface_points
@@ -23,6 +23,8 @@ from .core.validate import check_light_mesh
 SUBJECT = "light grid"
 # Pairs of a point and a light that the full sum may take: some seconds on one core.
 _PAIRS = 2_000_000
+# Share of a check that is done when the light mesh is judged and its grid is yet to be.
+LIGHT_MESH_TIME = 0.7
 _FEWEST_POINTS, _MOST_POINTS = 50, 1000
 NOTICEABLE_LOSS = GridSettings.tolerance
 """Share of the irradiance that a range may leave out unsaid: what the other mode may be off by if nothing is set."""
@@ -150,7 +152,9 @@ def check_lights(
 
     settings: None where all lights are summed. Raises InvalidInput, Cancelled.
     """
-    findings = check_light_mesh(light_mesh if light_mesh is not None else empty_light_mesh(), snapshot.meshes)
+    checked = light_mesh if light_mesh is not None else empty_light_mesh()
+    share = 1.0 if settings is None else LIGHT_MESH_TIME
+    findings = check_light_mesh(checked, snapshot.meshes, as_report(part(progress, 0.0, share), "light mesh"))
     if not light_mesh or settings is None or any(finding.kind in BROKEN for finding in findings):
         return findings
-    return (*findings, *bake_light_grid(snapshot, light_mesh, settings, progress).findings)
+    return (*findings, *bake_light_grid(snapshot, light_mesh, settings, part(progress, share, 1.0)).findings)

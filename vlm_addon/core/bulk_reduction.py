@@ -11,7 +11,6 @@ one in a Python loop: a vertex goes where its chain of collapses ends.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +28,7 @@ from .mesh_topology import (
     used_only,
 )
 from .morton import morton_codes
+from .progress import Report
 from .scene import Float64
 
 ATTEMPTS = 6
@@ -60,7 +60,7 @@ def reduce_groups(
     group: Int64,
     weight: Float64,
     target: int,
-    report: Callable[[float], None] = lambda share: None,
+    report: Report = lambda share: None,
 ) -> Reduced:
     """About `target` triangles, or more, shared among the groups, with the lines between groups in place.
 

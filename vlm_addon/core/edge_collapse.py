@@ -10,12 +10,12 @@ array operations do fast; the loss against one edge at a time is small because e
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .mesh_topology import Bool, HalfEdges, Int64, Rows, half_edges, rows_by_key, vertex_faces
+from .progress import Report
 from .quadrics import border_quadrics, energy, minimum, plane_quadrics, sum_at
 from .scene import Float64
 
@@ -92,7 +92,7 @@ def collapse_edges(
     weight: Float64,
     target: int,
     normals: Float64 | None = None,
-    report: Callable[[float], None] = lambda share: None,
+    report: Report = lambda share: None,
 ) -> CollapsedMesh:
     """At most `target` triangles where the topology allows it, and at most one or two fewer than that.
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from .light_mesh import SourceSamples, VirtualLightMesh
 from .mesh_topology import Bool, Int64, Rows, connected_components, half_edges, rows_by_key, sum_by
+from .progress import Report
 from .scene import Float64
 from .triangle_tree import build_tree
 
@@ -75,12 +76,12 @@ def _facing(light_mesh: VirtualLightMesh) -> Float64:
     return sum_by(owner, cosine, len(light_mesh))
 
 
-def covered_twice(light_mesh: VirtualLightMesh) -> Bool:
+def covered_twice(light_mesh: VirtualLightMesh, report: Report = lambda share: None) -> Bool:
     """(n,) lights of which at least COVERED_SHARE of the source samples belong to others, too; of several that cover
-    each other, the largest and first stays."""
+    each other, the largest and first stays. report: called with the share of the work that is done, may raise."""
     size = np.sqrt(light_mesh.areas)
     count = len(light_mesh)
-    light, above, weight = _covering_pairs(light_mesh, size)
+    light, above, weight = _covering_pairs(light_mesh, size, report)
     twice = np.zeros(count, bool)
     if not len(light):
         return twice
@@ -106,7 +107,7 @@ def _rounded(sizes: Float64) -> Float64:
     return rounded
 
 
-def _covering_pairs(light_mesh: VirtualLightMesh, size: Float64) -> tuple[Int64, Int64, Float64]:
+def _covering_pairs(light_mesh: VirtualLightMesh, size: Float64, report: Report) -> tuple[Int64, Int64, Float64]:
     """(light, other, weight of the sample) for every source sample of a light that lies in the region of another, too:
     behind it is the other, facing alike, and it is as high above that one's plane as that one's own samples are."""
     samples, corners = light_mesh.samples, light_mesh.corners
@@ -121,7 +122,8 @@ def _covering_pairs(light_mesh: VirtualLightMesh, size: Float64) -> tuple[Int64,
     reach = np.maximum(np.where(high > -np.inf, high, 0.0), 0.0) + near
     ahead = np.maximum(np.where(low < np.inf, -low, 0.0), 0.0) + near
     start = samples.positions + ahead[owner, None] * normal[owner]
-    segment, met = build_tree(corners).all_met(start, samples.positions - reach[owner, None] * normal[owner])
+    end = samples.positions - reach[owner, None] * normal[owner]
+    segment, met = build_tree(corners).all_met(start, end, report)
     light = owner[segment]
     chosen = (light != met) & (np.einsum("ij,ij->i", normal[light], normal[met]) > SIMILAR_COSINE)
     segment, light, met = segment[chosen], light[chosen], met[chosen]

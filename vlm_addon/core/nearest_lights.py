@@ -12,18 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .corner_arrays import highest, lowest, middles
 from .light_mesh import VirtualLightMesh
 from .mesh_topology import Int64, Rows, normals_and_areas
 from .morton import morton_codes
+from .parallel import side_by_side, slices
+from .progress import Report
 from .scene import Float64, Int32, Mesh
 from .triangle_distance import FlatTriangles, flat_triangles
 
 # Triangles that look for candidates together, level by level.
-BLOCKS = (2048, 256, 32, 4)
+BLOCKS = (1024, 256, 64, 16, 4)
+# Triangles that are looked at side by side with others.
+TRIANGLES_PER_BATCH = 1 << 14
 # Pairs of a block or triangle and a light that are held at once.
-PAIRS_PER_BATCH = 1 << 20
-# What rounding may take from a bound.
+PAIRS_PER_BATCH = 1 << 17
+# What rounding may take from a bound, and from the part of it that is due to angles, as a share of a light's area.
 SLACK = 1e-9
+ANGLE_SLACK = 1e-7
 
 
 def pair_nearest(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> tuple[Int32, ...]:
@@ -36,25 +42,33 @@ def pair_nearest(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> tuple[
     return tuple(np.split(lights, np.cumsum(counts)[:-1]))
 
 
-def light_of_triangles(light_corners: Float64, source_corners: Float64) -> Int32:
-    """(t,) int32: the nearest of the lights (n, 3, 3) for each triangle (t, 3, 3), -1 without lights."""
+def light_of_triangles(light_corners: Float64, source_corners: Float64, report: Report = lambda share: None) -> Int32:
+    """(t,) int32: the nearest of the lights (n, 3, 3) for each triangle (t, 3, 3), -1 without lights.
+
+    report: called with the share of the work that is done, may raise.
+    """
     nearest = np.full(len(source_corners), -1, np.int32)
     if not len(light_corners) or not len(source_corners):
         return nearest
-    middle, normal = source_corners.mean(axis=1), normals_and_areas(source_corners)[0]
+    middle, normal = middles(source_corners), normals_and_areas(source_corners)[0]
     axis = np.abs(normal).argmax(axis=1)
     side = 2 * axis + (normal[np.arange(len(normal)), axis] < 0)
     order = np.lexsort([morton_codes(middle), side])
     lights = _Lights.of(light_corners)
-    blocks_at_once = max(1, PAIRS_PER_BATCH // len(light_corners)) * BLOCKS[0]
-    for first in range(0, len(order), blocks_at_once):
-        rows = order[first : first + blocks_at_once]
-        nearest[rows] = _nearest(lights, middle[rows], normal[rows])
+    batches = [order[part] for part in slices(len(order), TRIANGLES_PER_BATCH)]
+
+    def look(rows: Int64) -> Int32:
+        return _nearest(lights, middle[rows], normal[rows])
+
+    for rows, found in zip(batches, side_by_side(look, batches, report), strict=True):
+        nearest[rows] = found
     return nearest
 
 
 @dataclass(frozen=True)
 class _Lights:
+    """Lights; low, high, middle, normal: (3, n), a row for each axis."""
+
     flat: FlatTriangles
     low: Float64
     high: Float64
@@ -65,8 +79,8 @@ class _Lights:
     @staticmethod
     def of(corners: Float64) -> _Lights:
         normal, area = normals_and_areas(corners)
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        return _Lights(flat_triangles(corners), low, high, corners.mean(axis=1), normal, area)
+        low, high, middle = lowest(corners).T.copy(), highest(corners).T.copy(), middles(corners).T.copy()
+        return _Lights(flat_triangles(corners), low, high, middle, normal.T.copy(), area)
 
 
 def _nearest(lights: _Lights, middle: Float64, normal: Float64) -> Int32:
@@ -87,12 +101,14 @@ def _nearest(lights: _Lights, middle: Float64, normal: Float64) -> Int32:
 
 @dataclass(frozen=True)
 class _Boxes:
-    """Blocks of points: corners of their boxes, and a cone around their normals of half angle `spread`."""
+    """Blocks of points: corners of their boxes, and a cone around their normals; (3, b), a row for each axis. cosine,
+    sine: (b,) of the half angle of the cone."""
 
     low: Float64
     high: Float64
     axis: Float64
-    spread: Float64
+    cosine: Float64
+    sine: Float64
 
     @staticmethod
     def of(middle: Float64, normal: Float64, starts: Int64) -> _Boxes:
@@ -101,8 +117,9 @@ class _Boxes:
         axis = np.divide(axis, length, out=np.zeros_like(axis), where=length > 0)
         lengths = np.diff(np.append(starts, len(middle)))
         cosine = np.einsum("ij,ij->i", normal, np.repeat(axis, lengths, axis=0))
-        spread = np.arccos(np.clip(np.minimum.reduceat(cosine, starts), -1.0, 1.0))
-        return _Boxes(np.minimum.reduceat(middle, starts), np.maximum.reduceat(middle, starts), axis, spread)
+        cosine = np.clip(np.minimum.reduceat(cosine, starts), -1.0, 1.0)
+        low, high = np.minimum.reduceat(middle, starts), np.maximum.reduceat(middle, starts)
+        return _Boxes(low.T.copy(), high.T.copy(), axis.T.copy(), cosine, np.sqrt(1.0 - cosine * cosine))
 
 
 def _narrowed(lights: _Lights, box: _Boxes, pairs: Rows, parent: Int64) -> Rows:
@@ -111,31 +128,59 @@ def _narrowed(lights: _Lights, box: _Boxes, pairs: Rows, parent: Int64) -> Rows:
     for rows in _batches(pairs.lengths[parent]):
         owner, light = pairs.expand(parent[rows])
         row = rows[owner]
-        gap = np.maximum(lights.low[light] - box.high[row], box.low[row] - lights.high[light])
-        least = (np.maximum(gap, 0.0) ** 2).sum(axis=1)
-        way = np.maximum(box.high[row] - lights.middle[light], lights.middle[light] - box.low[row])
-        most = (way**2).sum(axis=1)
-        turned = np.arccos(np.clip(np.einsum("ij,ij->i", lights.normal[light], box.axis[row]), -1.0, 1.0))
-        spread, area = box.spread[row], lights.area[light]
-        least += (1.0 - np.cos(np.maximum(turned - spread, 0.0))) * area
-        most += (1.0 - np.cos(np.minimum(turned + spread, np.pi))) * area
-        keep = least <= _least_of_each(most, owner)[owner] * (1.0 + SLACK)
+        least, most = _distance_bounds(lights, box, light, row)
+        nearest, farthest = _turn_bounds(lights, box, light, row)
+        area = lights.area.take(light)
+        least += (nearest - ANGLE_SLACK) * area
+        most += (farthest + ANGLE_SLACK) * area
+        keep = least <= _least_of_each(most, owner).take(owner) * (1.0 + SLACK)
         kept_light.append(light[keep])
         count[rows] = np.bincount(owner[keep], minlength=len(rows))
     return Rows(np.concatenate(kept_light), np.concatenate([[0], np.cumsum(count)]))
 
 
+def _distance_bounds(lights: _Lights, box: _Boxes, light: Int64, row: Int64) -> tuple[Float64, Float64]:
+    """(p,) each: at least and at most the squared distance between any point of box `row` and the light beside it."""
+    least, most = np.zeros(len(light)), np.zeros(len(light))
+    for axis in range(3):
+        low, high = box.low[axis].take(row), box.high[axis].take(row)
+        gap = np.maximum(lights.low[axis].take(light) - high, low - lights.high[axis].take(light))
+        np.maximum(gap, 0.0, out=gap)
+        least += gap * gap
+        middle = lights.middle[axis].take(light)
+        way = np.maximum(high - middle, middle - low)
+        most += way * way
+    return least, most
+
+
+def _turn_bounds(lights: _Lights, box: _Boxes, light: Int64, row: Int64) -> tuple[Float64, Float64]:
+    """(p,) each: at least and at most 1 - cosine between any normal of block `row` and that of the light beside it."""
+    cosine = sum(lights.normal[axis].take(light) * box.axis[axis].take(row) for axis in range(3))
+    cosine = np.minimum(np.maximum(cosine, -1.0), 1.0)
+    spread, across = box.cosine.take(row), box.sine.take(row)
+    along, aside = cosine * spread, np.sqrt(1.0 - cosine * cosine) * across
+    # Cosines of the difference and the sum of both angles, unless it is below 0 or above 180 degrees.
+    least = np.where(cosine >= spread, 0.0, 1.0 - (along + aside))
+    most = np.where(cosine <= -spread, 2.0, 1.0 - (along - aside))
+    return least, most
+
+
 def _exact(lights: _Lights, middle: Float64, normal: Float64, pairs: Rows, parent: Int64) -> Int64:
     owner, light = pairs.expand(parent)
     # Rounding of unit normals may give cosines above 1, and a negative least score would keep no light at all.
-    cosine = np.minimum(np.einsum("ij,ij->i", normal[owner], lights.normal[light]), 1.0)
-    turned = (1.0 - cosine) * lights.area[light]
-    gap = np.maximum(lights.low[light] - middle[owner], middle[owner] - lights.high[light])
-    least = (np.maximum(gap, 0.0) ** 2).sum(axis=1) + turned
-    most = ((middle[owner] - lights.middle[light]) ** 2).sum(axis=1) + turned
-    keep = least <= _least_of_each(most, owner)[owner] * (1.0 + SLACK)
+    cosine = np.minimum(np.einsum("ij,ij->i", normal.take(owner, axis=0), lights.normal.T.take(light, axis=0)), 1.0)
+    turned = (1.0 - cosine) * lights.area.take(light)
+    least, most = turned.copy(), turned.copy()
+    for axis in range(3):
+        at = np.ascontiguousarray(middle[:, axis]).take(owner)
+        gap = np.maximum(lights.low[axis].take(light) - at, at - lights.high[axis].take(light))
+        np.maximum(gap, 0.0, out=gap)
+        least += gap * gap
+        way = at - lights.middle[axis].take(light)
+        most += way * way
+    keep = least <= _least_of_each(most, owner).take(owner) * (1.0 + SLACK)
     owner, light, turned = owner[keep], light[keep], turned[keep]
-    score = lights.flat.squared_distances(middle[owner], light) + turned
+    score = lights.flat.squared_distances(middle.take(owner, axis=0), light) + turned
     best = np.flatnonzero(score == _least_of_each(score, owner)[owner])
     return light[best[np.searchsorted(owner[best], np.arange(len(middle)))]]
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
+
+from .progress import Report
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -16,11 +18,20 @@ Result = TypeVar("Result")
 THREADS = min(os.cpu_count() or 1, 4)
 
 
-def side_by_side(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:
+def side_by_side(
+    work: Callable[[Part], Result], parts: Sequence[Part], report: Report = lambda share: None
+) -> Iterator[Result]:
     """`work` of each part, in their order. Raises what it raises.
 
-    Whoever stops asking, or raises in between, waits for the few parts that are under way.
+    Whoever stops asking, or raises in between, waits for the few parts that are under way. report: called with the
+    share of the parts that are done, may raise.
     """
+    for number, result in enumerate(_in_order(work, parts)):
+        report((number + 1) / len(parts))
+        yield result
+
+
+def _in_order(work: Callable[[Part], Result], parts: Sequence[Part]) -> Iterator[Result]:
     with ThreadPoolExecutor(THREADS) as pool:
         under_way: deque[Future[Result]] = deque()
         try:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from .bulk_reduction import Reduced, reduce_groups
 from .edge_collapse import CollapsedMesh, collapse_edges
 from .mesh_topology import Bool, Int64, normals_and_areas, used_only
+from .progress import Report
 from .scene import Float64
 from .source_surface import SourceSurface
 
@@ -46,9 +46,7 @@ class ReducedSurface:
     merged_borders: bool
 
 
-def reduce_surface(
-    surface: SourceSurface, target: int, report: Callable[[float], None] = lambda share: None
-) -> ReducedSurface:
+def reduce_surface(surface: SourceSurface, target: int, report: Report = lambda share: None) -> ReducedSurface:
     """At most `target` triangles; all with area where the surface has no more than that.
 
     report: called with the share of the work that is done, may raise.

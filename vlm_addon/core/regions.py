@@ -9,7 +9,6 @@ nearby, so that their power is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,7 @@ from .corner_arrays import middles
 from .mesh_topology import Bool, Int64, Rows, normals_and_areas, rows_by_key, sum_by, vertex_faces
 from .morton import morton_codes
 from .parallel import side_by_side, slices
+from .progress import Report
 from .reduce_surface import ReducedSurface
 from .scene import Float64
 from .source_surface import SourceSurface
@@ -38,9 +38,7 @@ class Regions:
     adopted: Bool
 
 
-def assign_regions(
-    surface: SourceSurface, reduced: ReducedSurface, report: Callable[[float], None] = lambda share: None
-) -> Regions:
+def assign_regions(surface: SourceSurface, reduced: ReducedSurface, report: Report = lambda share: None) -> Regions:
     """The region of each light; only one that faces away from everything near it is left without.
 
     report: called with the share of the work that is done, may raise.
@@ -59,9 +57,8 @@ def assign_regions(
     def nearest(rows: Int64) -> Int64:
         return _nearest_around(surface, lights, rows, merged.take(rows, axis=0), around)
 
-    for number, (rows, found) in enumerate(zip(batches, side_by_side(nearest, batches), strict=True)):
+    for rows, found in zip(batches, side_by_side(nearest, batches, report), strict=True):
         light_of[rows] = found
-        report(number / len(batches))
     if adopted.any():
         light_of[adopted] = _adopt(surface, lights, source_triangle, np.flatnonzero(adopted))
     return Regions(light_of, adopted)

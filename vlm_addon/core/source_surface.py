@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,6 +22,7 @@ from .mesh_topology import (
     used_only,
     weld,
 )
+from .progress import Report
 from .scene import Float64, Mesh
 
 # Importance of a black surface against a white one: it needs no lights, but its shape must still collapse in order.
@@ -85,7 +86,7 @@ class SourceSurface:
         return self.importance() * self.detail**DETAIL_POWER
 
 
-def join_surface(meshes: Sequence[Mesh], report: Callable[[float], None] = lambda share: None) -> SourceSurface:
+def join_surface(meshes: Sequence[Mesh], report: Report = lambda share: None) -> SourceSurface:
     """All triangles of `meshes` as one surface. Raises InvalidInput on values that are not finite or negative.
 
     report: called with the share of the work that is done, may raise.

@@ -18,6 +18,7 @@ from .light_mesh import VirtualLightMesh
 from .mesh_topology import Bool, Int64, closed_shells, unit_normals, weld
 from .nearest_lights import light_of_triangles
 from .placement import STEEPEST_COSINE, THICKNESS_SHARE, insets
+from .progress import Report, between
 from .sampling import square_to_triangle
 from .scene import Float64, Int32, Mesh
 from .triangle_tree import TriangleTree, build_tree
@@ -34,6 +35,8 @@ SEEN_SHARE = 0.25
 GAP_SHARE = 0.25
 # A ray starts this share of the scene's half diagonal behind its surface.
 START_SHARE = 1e-6
+# Share of the time that it takes to find the nearest lights.
+NEAREST_TIME = 0.5
 
 
 @dataclass(frozen=True)
@@ -46,11 +49,15 @@ class ThinSurface:
 
 
 def thin_triangles(
-    meshes: Sequence[Mesh], light_mesh: VirtualLightMesh, light_of_triangle: npt.ArrayLike | None = None
+    meshes: Sequence[Mesh],
+    light_mesh: VirtualLightMesh,
+    light_of_triangle: npt.ArrayLike | None = None,
+    report: Report = lambda share: None,
 ) -> ThinSurface:
     """The triangles of `meshes` that need tags, whether or not they have any.
 
-    light_of_triangle: (all triangles,) int, -1 for none; the nearest light by default.
+    light_of_triangle: (all triangles,) int, -1 for none; the nearest light by default. report: called with the share
+    of the work that is done, may raise.
     """
     counts = [len(mesh.triangles) for mesh in meshes]
     if not sum(counts) or not len(light_mesh):
@@ -58,21 +65,24 @@ def thin_triangles(
         return ThinSurface(none, none)
     corners = np.concatenate([mesh.positions[mesh.triangles] for mesh in meshes])
     if light_of_triangle is None:
-        lights: Int32 = light_of_triangles(light_mesh.corners, corners)
+        lights: Int32 = light_of_triangles(light_mesh.corners, corners, between(report, 0.0, NEAREST_TIME))
     else:
         lights = np.asarray(light_of_triangle, np.int32)
     tree = build_tree(corners)
     at = np.cumsum(counts)[:-1]
-    thin = thin_against(light_mesh.corners, lights, corners, tree)
-    seen = two_sided(lights, corners, open_triangles(meshes), tree)
+    half = 0.5 * (1.0 + NEAREST_TIME)
+    thin = thin_against(light_mesh.corners, lights, corners, tree, between(report, NEAREST_TIME, half))
+    seen = two_sided(lights, corners, open_triangles(meshes), tree, between(report, half, 1.0))
     return ThinSurface(tuple(np.split(thin, at)), tuple(np.split(seen, at)))
 
 
-def thin_against(light_corners: Float64, lights: Lights, corners: Float64, tree: TriangleTree) -> Bool:
+def thin_against(
+    light_corners: Float64, lights: Lights, corners: Float64, tree: TriangleTree, report: Report = lambda share: None
+) -> Bool:
     """(t,) whether each source triangle (t, 3, 3) belongs to a region that bulges inwards by more than its body allows.
 
     The bulge of a region is the height that its corners span over the plane of its light. lights: (t,), -1 for none.
-    tree: of the source triangles.
+    tree: of the source triangles. report: called with the share of the rays that are done, may raise.
     """
     rows = np.flatnonzero(lights >= 0)
     light = lights[rows]
@@ -89,7 +99,7 @@ def thin_against(light_corners: Float64, lights: Lights, corners: Float64, tree:
     middle = corners[rows].mean(axis=1)
     reach = normals[rows] * (bulge[light] / THICKNESS_SHARE)[:, None]
     thin = np.zeros(len(corners), bool)
-    thin[rows] = np.isfinite(tree.first_hits(middle, middle - reach, True))
+    thin[rows] = np.isfinite(tree.first_hits(middle, middle - reach, True, report))
     return thin
 
 
@@ -109,10 +119,13 @@ def open_triangles(meshes: Sequence[Mesh]) -> Bool:
     return np.concatenate(parts) if parts else np.zeros(0, bool)
 
 
-def two_sided(lights: Lights, corners: Float64, is_open: Bool, tree: TriangleTree) -> Bool:
+def two_sided(
+    lights: Lights, corners: Float64, is_open: Bool, tree: TriangleTree, report: Report = lambda share: None
+) -> Bool:
     """(t,) triangles of sheets whose back some surface faces: by BACK_RAYS rays from the back of each region.
 
-    Only triangles of `is_open` count. What lies inside of an open body meets backs of its own and is not seen.
+    Only triangles of `is_open` count. What lies inside of an open body meets backs of its own and is not seen. report:
+    called with the share of the rays that are done, may raise.
     """
     rows = np.flatnonzero(is_open & (lights >= 0))
     seen = np.zeros(len(corners), bool)
@@ -126,7 +139,9 @@ def two_sided(lights: Lights, corners: Float64, is_open: Bool, tree: TriangleTre
     looked_at = np.arange(count)
     for rays in (np.arange(FIRST_RAYS), np.arange(FIRST_RAYS, BACK_RAYS)):
         which = (looked_at[:, None] * BACK_RAYS + rays).ravel()
-        fronts, others = _met_sides(points[which], directions[which], np.repeat(gap[looked_at], len(rays)), tree)
+        done = between(report, rays[0] / BACK_RAYS, (rays[-1] + 1) / BACK_RAYS)
+        gaps = np.repeat(gap[looked_at], len(rays))
+        fronts, others = _met_sides(points[which], directions[which], gaps, tree, done)
         faced[looked_at] += fronts.reshape(-1, len(rays)).sum(axis=1)
         hidden[looked_at] += others.reshape(-1, len(rays)).sum(axis=1)
         # What is faced at all often enough shows in the first rays.
@@ -144,12 +159,14 @@ def _extents(corners: Float64, region: Int64, count: int) -> Float64:
     return extents
 
 
-def _met_sides(points: Float64, directions: Float64, gap: Float64, tree: TriangleTree) -> tuple[Bool, Bool]:
+def _met_sides(
+    points: Float64, directions: Float64, gap: Float64, tree: TriangleTree, report: Report
+) -> tuple[Bool, Bool]:
     """((r,) whether each ray from just off `points` first meets a front farther off than the gap, or else anything)."""
     corners = tree.corners
     diagonal = float(np.linalg.norm(corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))))
     start = points + START_SHARE * diagonal * directions
-    met, fraction = tree.first_met_at(start, points + diagonal * directions)
+    met, fraction = tree.first_met_at(start, points + diagonal * directions, report=report)
     facing = np.einsum("ij,ij->i", unit_normals(corners[met]), directions) < 0
     front: Bool = (met >= 0) & facing & (fraction * diagonal > gap)
     return front, (met >= 0) & ~front

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from .corner_arrays import highest, lowest, middles
 from .mesh_topology import Bool, Int64, sorted_with_order
 from .morton import BITS_PER_AXIS, morton_codes
 from .parallel import side_by_side, slices
+from .progress import Report, between
 from .scene import Float64
 
 LEAF_SIZE = 4
@@ -22,42 +25,71 @@ HIT_START = 1e-6
 EDGE_SLACK = 1e-9
 # Entering and leaving a box that is flat agree up to rounding.
 SLAB_SLACK = 1e-9
-SEGMENTS_PER_BATCH = 1 << 14
+# What a batch meets stays within a cache.
+SEGMENTS_PER_BATCH = 1 << 11
+# Segments longer than this share of the tree's diagonal are looked at in parts: most end in the first ones.
+FAR_SHARE = 0.1
+FAR_PARTS = (1.0 / 16.0, 1.0 / 4.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """low, high: (3, n) m, of which the first `filled` hold something."""
+
+    low: Float64
+    high: Float64
+    filled: int
+
+    def joined(self, count: int) -> Boxes:
+        """Boxes around each `count` that follow each other; a power of two."""
+        if count == 1:
+            return self
+        low = np.minimum(self.low[:, 0::2], self.low[:, 1::2])
+        high = np.maximum(self.high[:, 0::2], self.high[:, 1::2])
+        return Boxes(low, high, -(-self.filled // 2)).joined(count // 2)
 
 
 @dataclass(frozen=True)
 class TriangleTree:
     """A complete binary tree over triangles in Morton order.
 
-    order: (slots,) int64, triangle of each slot of the leaves, -1 for padding. lower, upper: one (nodes, 3) array per
-    level, root first. triangle_lower, triangle_upper: (t, 3) box of each triangle.
+    order: (t,) int64, triangle of each slot; leaves have LEAF_SIZE slots each. levels: root first, boxes of the nodes.
+    slots: boxes of the triangles in their order, padded.
     """
 
     corners: Float64
     order: Int64
-    lower: tuple[Float64, ...]
-    upper: tuple[Float64, ...]
-    triangle_lower: Float64
-    triangle_upper: Float64
+    levels: tuple[Boxes, ...]
+    slots: Boxes
 
-    def first_hits(self, origins: Float64, ends: Float64, from_behind: bool = False) -> Float64:
+    @property
+    def diagonal(self) -> float:
+        """Of the box of all triangles, m; 0 for none."""
+        root = self.levels[0]
+        return float(np.linalg.norm(root.high - root.low)) if root.filled else 0.0
+
+    def first_hits(
+        self, origins: Float64, ends: Float64, from_behind: bool = False, report: Report = lambda share: None
+    ) -> Float64:
         """(r,) fraction in (0, 1] of the way from origin to end at which each segment first meets a triangle, else inf.
 
         origins, ends: (r, 3). from_behind: count only triangles whose front faces away from the origin. Starting
-        points that lie on a triangle do not count as hits.
+        points that lie on a triangle do not count as hits. report: called with the share that is done, may raise.
         """
-        return _first_hits(self, origins, ends, from_behind)[0]
+        return _first_hits(self, origins, ends, from_behind, report)[0]
 
     def first_met(self, origins: Float64, ends: Float64, from_behind: bool = False) -> Int64:
         """(r,) int64: the triangle that `first_hits` finds, -1 for none."""
         return self.first_met_at(origins, ends, from_behind)[0]
 
-    def first_met_at(self, origins: Float64, ends: Float64, from_behind: bool = False) -> tuple[Int64, Float64]:
+    def first_met_at(
+        self, origins: Float64, ends: Float64, from_behind: bool = False, report: Report = lambda share: None
+    ) -> tuple[Int64, Float64]:
         """`first_met` and `first_hits` of each segment."""
-        fraction, met = _first_hits(self, origins, ends, from_behind)
+        fraction, met = _first_hits(self, origins, ends, from_behind, report)
         return met, fraction
 
-    def all_met(self, origins: Float64, ends: Float64) -> tuple[Int64, Int64]:
+    def all_met(self, origins: Float64, ends: Float64, report: Report = lambda share: None) -> tuple[Int64, Int64]:
         """(segment, triangle), each (k,) int64: all triangles that each segment meets, from either side."""
 
         def met(rows: slice) -> tuple[Int64, Int64]:
@@ -65,7 +97,7 @@ class TriangleTree:
             hit = np.isfinite(fraction)
             return rows.start + segment[hit], triangle[hit]
 
-        found = list(side_by_side(met, slices(len(origins), SEGMENTS_PER_BATCH)))
+        found = list(side_by_side(met, slices(len(origins), SEGMENTS_PER_BATCH), report))
         none = np.zeros(0, np.int64)
         segments, triangles = zip(*found, strict=True) if found else ((), ())
         return np.concatenate([none, *segments]), np.concatenate([none, *triangles])
@@ -74,19 +106,18 @@ class TriangleTree:
 def build_tree(corners: Float64) -> TriangleTree:
     """The tree of (t, 3, 3) triangles."""
     count = len(corners)
-    levels = max(0, int(np.ceil(np.log2(max(count, 1) / LEAF_SIZE)))) if count > LEAF_SIZE else 0
-    order = np.full(LEAF_SIZE << levels, -1, np.int64)
+    depth = max(0, int(np.ceil(np.log2(max(count, 1) / LEAF_SIZE)))) if count > LEAF_SIZE else 0
     box_low, box_high = lowest(corners), highest(corners)
-    order[:count] = _spatial_order(corners, box_low, box_high)
-    low = np.full((len(order), 3), np.inf)
-    high = np.full((len(order), 3), -np.inf)
-    low[:count], high[:count] = box_low.take(order[:count], axis=0), box_high.take(order[:count], axis=0)
-    lower, upper = [low], [high]
-    for _ in range(int(np.log2(LEAF_SIZE)) + levels):
-        lower.insert(0, np.minimum(lower[0][0::2], lower[0][1::2]))
-        upper.insert(0, np.maximum(upper[0][0::2], upper[0][1::2]))
-    lower, upper = lower[: levels + 1], upper[: levels + 1]
-    return TriangleTree(corners, order, tuple(lower), tuple(upper), box_low, box_high)
+    order = _spatial_order(corners, box_low, box_high)
+    low = np.full((3, LEAF_SIZE << depth), np.inf)
+    high = np.full((3, LEAF_SIZE << depth), -np.inf)
+    for axis in range(3):
+        low[axis, :count], high[axis, :count] = box_low[order, axis], box_high[order, axis]
+    slots = Boxes(low, high, count)
+    levels = [slots.joined(LEAF_SIZE)]
+    for _ in range(depth):
+        levels.insert(0, levels[0].joined(2))
+    return TriangleTree(corners, order, tuple(levels), slots)
 
 
 def _spatial_order(corners: Float64, low: Float64, high: Float64) -> Int64:
@@ -108,59 +139,71 @@ def _size_classes(low: Float64, high: Float64) -> Int64:
     return classes
 
 
-def _first_hits(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> tuple[Float64, Int64]:
+def _first_hits(
+    tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool, report: Report
+) -> tuple[Float64, Int64]:
     nearest, met = np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
 
-    def look(rows: slice) -> None:
-        segment, triangle, fraction = _met(tree, origins[rows], ends[rows], from_behind)
-        hit = np.flatnonzero(np.isfinite(fraction))
+    def look(rows: Int64, until: float) -> None:
+        segment, triangle, fraction = _met(tree, origins[rows], ends[rows], from_behind, until)
+        hit = np.flatnonzero(fraction <= until)
         hit = hit[np.lexsort([fraction[hit], segment[hit]])]
         hit = hit[np.diff(segment[hit], prepend=-1) > 0]
-        nearest[rows][segment[hit]] = fraction[hit]
-        met[rows][segment[hit]] = triangle[hit]
+        nearest[rows[segment[hit]]], met[rows[segment[hit]]] = fraction[hit], triangle[hit]
 
-    for _ in side_by_side(look, slices(len(origins), SEGMENTS_PER_BATCH)):
-        pass
+    is_far = np.linalg.norm(ends - origins, axis=1) > FAR_SHARE * tree.diagonal
+    stages = [(1.0, ~is_far), *((until, is_far) for until in FAR_PARTS)]
+    for number, (until, chosen) in enumerate(stages):
+        rows = np.flatnonzero(chosen & (met < 0))
+        batches = [rows[part] for part in slices(len(rows), SEGMENTS_PER_BATCH)]
+        done = between(report, number / len(stages), (number + 1) / len(stages))
+        deque(side_by_side(partial(look, until=until), batches, done), maxlen=0)
     return nearest, met
 
 
-def _met(tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool) -> tuple[Int64, Int64, Float64]:
+def _met(
+    tree: TriangleTree, origins: Float64, ends: Float64, from_behind: bool, until: float = 1.0
+) -> tuple[Int64, Int64, Float64]:
     """(segment, triangle, fraction) where segments meet boxes of triangles; inf where not the triangle itself."""
-    segment, triangle = _met_boxes(tree, origins, ends)
+    segment, triangle = _met_boxes(tree, origins, ends, until)
     corners = tree.corners.take(triangle, axis=0)
     return segment, triangle, _intersections(corners, origins[segment], ends[segment], from_behind)
 
 
-def _met_boxes(tree: TriangleTree, origins: Float64, ends: Float64) -> tuple[Int64, Int64]:
-    """(segment, triangle) of all pairs of which the segment meets the triangle's box."""
-    low, high = np.minimum(origins, ends), np.maximum(origins, ends)
+def _met_boxes(tree: TriangleTree, origins: Float64, ends: Float64, until: float) -> tuple[Int64, Int64]:
+    """(segment, triangle) of all pairs of which the segment, up to a share `until` of it, meets the triangle's box."""
     way = ends - origins
-    # Along an axis on which a segment does not move, the box test alone decides: any finite inverse will do.
-    inverse = 1.0 / np.where(np.abs(way) > np.finfo(float).tiny, way, 1.0)
     moves = np.abs(way) > np.finfo(float).tiny
+    start, inverse = origins.T.copy(), (1.0 / np.where(moves, way, 1.0)).T.copy()
+    still = None if moves.all() else ~moves.T
 
-    def meets(segment: Int64, box_low: Float64, box_high: Float64) -> Bool:
-        overlap = (low[segment] <= box_high).all(axis=1) & (high[segment] >= box_low).all(axis=1)
-        near = np.flatnonzero(overlap)
-        row = segment[near]
-        first, last = (box_low[near] - origins[row]) * inverse[row], (box_high[near] - origins[row]) * inverse[row]
-        enters = np.where(moves[row], np.minimum(first, last), -np.inf).max(axis=1)
-        leaves = np.where(moves[row], np.maximum(first, last), np.inf).min(axis=1)
-        overlap[near] = enters <= leaves + SLAB_SLACK * (1.0 + np.abs(leaves))
+    def meets(segment: Int64, node: Int64, boxes: Boxes) -> Bool:
+        enters, leaves = np.zeros(len(segment)), np.full(len(segment), until)
+        for axis in range(3):
+            at, scale = start[axis].take(segment), inverse[axis].take(segment)
+            below, above = boxes.low[axis].take(node) - at, boxes.high[axis].take(node) - at
+            first, last = below * scale, above * scale
+            if still is not None:
+                rests = still[axis].take(segment)
+                inside = (below <= 0.0) & (above >= 0.0)
+                first = np.where(rests, np.where(inside, -np.inf, np.inf), first)
+                last = np.where(rests, np.inf, last)
+            np.maximum(enters, np.minimum(first, last), out=enters)
+            np.minimum(leaves, np.maximum(first, last), out=leaves)
+        overlap: Bool = enters <= leaves + SLAB_SLACK * (1.0 + np.abs(leaves))
         return overlap
 
     segment, node = np.arange(len(origins)), np.zeros(len(origins), np.int64)
-    for level, (node_low, node_high) in enumerate(zip(tree.lower, tree.upper, strict=True)):
+    for level, boxes in enumerate(tree.levels):
         if level:
             segment, node = np.repeat(segment, 2), np.repeat(2 * node, 2)
             node[1::2] += 1
-        overlap = meets(segment, node_low[node], node_high[node])
+        overlap = meets(segment, node, boxes) & (node < boxes.filled)
         segment, node = segment[overlap], node[overlap]
-    triangle = tree.order.reshape(-1, LEAF_SIZE)[node]
-    segment = np.repeat(segment, LEAF_SIZE)[triangle.ravel() >= 0]
-    triangle = triangle[triangle >= 0]
-    overlap = meets(segment, tree.triangle_lower[triangle], tree.triangle_upper[triangle])
-    return segment[overlap], triangle[overlap]
+    slot = (node[:, None] * LEAF_SIZE + np.arange(LEAF_SIZE)).ravel()
+    segment = np.repeat(segment, LEAF_SIZE)
+    overlap = meets(segment, slot, tree.slots) & (slot < tree.slots.filled)
+    return segment[overlap], tree.order[slot[overlap]]
 
 
 def _intersections(corners: Float64, origin: Float64, end: Float64, from_behind: bool) -> Float64:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from . import finding_kinds as kinds
 from .light_links import leaves_out
 from .light_mesh import VirtualLightMesh
 from .light_overlaps import badly_joined, covered_twice
-from .mesh_topology import Bool, Int64, rows_by_key, sum_by
+from .mesh_topology import Bool, Int64, normals_and_areas, rows_by_key, sum_by
 from .nearest_lights import light_of_triangles
 from .placement import insets
+from .progress import Report, between
 from .scene import Finding, Float64, Int32, Mesh
 from .thin_surface import open_triangles, thin_against, two_sided
 from .triangle_tree import TriangleTree, build_tree
@@ -34,28 +36,39 @@ THICKNESS_PLACES = 24
 # Mean cosine between a light and its source samples below which it counts as inside out: a light that stands for a
 # small knob may well have a mean about zero, a flipped one has nearly -1.
 INSIDE_OUT_COSINE = -0.3
+# Share of the work that is done when the nearest lights are known, and when the joints are.
+NEAREST_TIME, JOINTS_TIME = 0.45, 0.7
 
 
-def check_light_mesh(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh] = ()) -> tuple[Finding, ...]:
+def check_light_mesh(
+    light_mesh: VirtualLightMesh,
+    meshes: Sequence[Mesh] = (),
+    report: Report = lambda share: None,
+    light_of_triangle: Sequence[Int32] | None = None,
+) -> tuple[Finding, ...]:
     """Findings on `light_mesh`, the gravest first; none for a sound one. Their kinds are those of finding_kinds.py.
 
     meshes: the visible surface, for what lights and surface should share: tags, and whether a body is too thin for its
     lights. Reflectance is judged by colour alone; the strength that makes up for lost area is expected to exceed 1.
+    report: called with the share of the work that is done, may raise. light_of_triangle: for each mesh the light of
+    each of its triangles, -1 for none, where that is known; the nearest lights by default.
     """
     if not len(light_mesh):
         return (Finding(SUBJECT, "it has no lights", "create it from a selection, or draw lights", kinds.EMPTY),)
     broken = _broken(light_mesh)
     if broken:
         return tuple(broken)
-    surface = _surface(light_mesh, meshes)
-    found = [*_degenerate(light_mesh), *_joints(light_mesh), *_source_findings(light_mesh, surface)]
+    surface = _surface(light_mesh, meshes, light_of_triangle, between(report, 0.0, NEAREST_TIME))
+    report(NEAREST_TIME)
+    found = [*_degenerate(light_mesh), *_joints(light_mesh, between(report, NEAREST_TIME, JOINTS_TIME))]
+    found += _source_findings(light_mesh, surface, between(report, JOINTS_TIME, 1.0))
     return (*found, *_bright(light_mesh), *_lost_tags(light_mesh, meshes))
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """The visible surface, each triangle with the nearest light. corners: (t, 3, 3). left_out: (t,) bool, whether tags
-    or links leave out that light. is_open: (t,) bool, of a shell with a border."""
+    """The visible surface, each triangle with its light, -1 for none. corners: (t, 3, 3). left_out: (t,) bool, whether
+    tags or links leave out that light. is_open: (t,) bool, of a shell with a border."""
 
     light_mesh: VirtualLightMesh
     corners: Float64
@@ -67,27 +80,34 @@ class _Surface:
         """(n,) lights that their whole region leaves out."""
         return self._share(self.left_out, self.lights >= 0) >= 1.0 - NOTICEABLE_SHARE
 
-    def thin(self, chosen: Bool) -> Bool:
+    def thin(self, chosen: Bool, report: Report) -> Bool:
         """(n,) those of the chosen lights whose body is too thin for them, by some triangles of each."""
         asked = self._some(chosen)
         lights = np.where(asked, self.lights, -1)
-        thin = thin_against(self.light_mesh.corners, lights, self.corners, self._tree())
+        thin = thin_against(self.light_mesh.corners, lights, self.corners, self.tree, report)
         return self._share(thin, asked) > NOTICEABLE_SHARE
 
-    def two_sided(self) -> Bool:
+    def two_sided(self, report: Report) -> Bool:
         """(n,) lights that stand for sheets seen from both sides."""
         lights = np.where(self.left_out, -1, self.lights)
         if not (self.is_open & (lights >= 0)).any():
             return np.zeros(len(self.light_mesh), bool)
-        seen = two_sided(lights, self.corners, self.is_open, self._tree())
+        seen = two_sided(lights, self.corners, self.is_open, self.tree, report)
         return self._share(seen, self.lights >= 0) > NOTICEABLE_SHARE
 
-    def _tree(self) -> TriangleTree:
+    @cached_property
+    def tree(self) -> TriangleTree:
+        """Of all triangles."""
         return build_tree(self.corners)
+
+    @cached_property
+    def areas(self) -> Float64:
+        """(t,) m²."""
+        return normals_and_areas(self.corners)[1]
 
     def _some(self, chosen: Bool) -> Bool:
         """(t,) up to THICKNESS_PLACES triangles of the region of each chosen light, evenly by row."""
-        rows = np.flatnonzero(chosen[self.lights] & ~self.left_out)
+        rows = np.flatnonzero((self.lights >= 0) & chosen[self.lights] & ~self.left_out)
         regions = rows_by_key(self.lights[rows], len(chosen), rows)
         owner = np.repeat(np.arange(len(chosen)), regions.lengths)
         place = np.arange(len(owner)) - regions.starts[owner]
@@ -98,22 +118,30 @@ class _Surface:
 
     def _share(self, chosen: Bool, among: Bool) -> Float64:
         """(n,) share by area of the chosen triangles among some of each region."""
-        corners = self.corners
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        whole, part = (sum_by(self.lights, area * each, len(self.light_mesh)) for each in (among, chosen & among))
+        rows = np.flatnonzero(among & (self.lights >= 0))
+        lights, areas = self.lights[rows], self.areas[rows]
+        whole, part = (sum_by(lights, each, len(self.light_mesh)) for each in (areas, areas * chosen[rows]))
         share: Float64 = part / np.maximum(whole, np.finfo(float).tiny)
         return share
 
 
-def _surface(light_mesh: VirtualLightMesh, meshes: Sequence[Mesh]) -> _Surface:
+def _surface(
+    light_mesh: VirtualLightMesh,
+    meshes: Sequence[Mesh],
+    light_of_triangle: Sequence[Int32] | None,
+    report: Report,
+) -> _Surface:
     filled = [mesh for mesh in meshes if len(mesh.triangles)]
     if not filled:
         none = np.zeros(0, bool)
         return _Surface(light_mesh, np.zeros((0, 3, 3)), np.zeros(0, np.int64), none, none)
     corners = np.concatenate([mesh.positions[mesh.triangles] for mesh in filled])
-    lights = light_of_triangles(light_mesh.corners, corners).astype(np.int64)
+    if light_of_triangle is None:
+        lights = light_of_triangles(light_mesh.corners, corners, report).astype(np.int64)
+    else:
+        lights = np.concatenate(light_of_triangle).astype(np.int64)
     tags = np.concatenate([mesh.tag_ids for mesh in filled])
-    left_out = leaves_out(light_mesh.links, light_mesh.tag_ids[lights], tags)
+    left_out = (lights >= 0) & leaves_out(light_mesh.links, light_mesh.tag_ids[lights], tags)
     return _Surface(light_mesh, corners, lights, left_out, open_triangles(filled))
 
 
@@ -167,7 +195,7 @@ def _degenerate(light_mesh: VirtualLightMesh) -> list[Finding]:
     return found
 
 
-def _joints(light_mesh: VirtualLightMesh) -> list[Finding]:
+def _joints(light_mesh: VirtualLightMesh, report: Report) -> list[Finding]:
     """Neighbours that face against each other, and lights that lie on others."""
     found: list[Finding] = []
     crossed = badly_joined(light_mesh)
@@ -176,7 +204,7 @@ def _joints(light_mesh: VirtualLightMesh) -> list[Finding]:
         problem = f"{lights} against the lights beside (first: light {int(np.argmax(crossed))})"
         remedy = "flip them, so that all of a surface shine to one side"
         found.append(Finding(SUBJECT, problem, remedy, kinds.NON_MANIFOLD, _rows(np.flatnonzero(crossed))))
-    twice = covered_twice(light_mesh)
+    twice = covered_twice(light_mesh, report)
     if twice.any():
         lights = "1 light lies" if twice.sum() == 1 else f"{int(twice.sum())} lights lie"
         problem = (
@@ -195,7 +223,7 @@ def _bright(light_mesh: VirtualLightMesh) -> list[Finding]:
     return found
 
 
-def _source_findings(light_mesh: VirtualLightMesh, surface: _Surface) -> list[Finding]:
+def _source_findings(light_mesh: VirtualLightMesh, surface: _Surface, report: Report) -> list[Finding]:
     samples = light_mesh.samples
     counts = np.diff(samples.offsets)
     found: list[Finding] = []
@@ -212,7 +240,7 @@ def _source_findings(light_mesh: VirtualLightMesh, surface: _Surface) -> list[Fi
     _append(found, reversed_, facing, problem, "flip their normals", kinds.INSIDE_OUT)
     share, depth = _in_front(light_mesh, normal)
     share = np.where(reversed_, 0.0, share)
-    found.extend(_depth_findings(share, depth, surface))
+    found.extend(_depth_findings(share, depth, surface, report))
     return found
 
 
@@ -230,11 +258,11 @@ def _in_front(light_mesh: VirtualLightMesh, normal: Float64) -> tuple[Float64, F
     return share, deepest
 
 
-def _depth_findings(share: Float64, depth: Float64, surface: _Surface) -> list[Finding]:
+def _depth_findings(share: Float64, depth: Float64, surface: _Surface, report: Report) -> list[Finding]:
     """What stands in front, apart where the body is too thin to move it (figure 3.7) or has no inside (figure 3.6)."""
     stands = (share > NOTICEABLE_SHARE) & ~surface.excused()
-    thin = stands & surface.thin(stands)
-    seen = surface.two_sided()
+    thin = stands & surface.thin(stands, between(report, 0.0, 0.5))
+    seen = surface.two_sided(between(report, 0.5, 1.0))
     found = []
     movable = stands & ~thin
     remedy = "move them behind it, or give both a common tag where the body is thin"

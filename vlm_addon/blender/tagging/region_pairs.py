@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.mesh_topology import Bool, Int64, unit_normals
 from ...core.nearest_lights import light_of_triangles
-from ...core.progress import Progress, step
+from ...core.progress import Progress, Report, as_report, part, step
 from ...core.sampling import sample_counts, sample_regions
 from ...core.scene import Float64, Mesh
 from ...core.triangle_distance import flat_triangles
@@ -59,9 +59,10 @@ def region_pairs(lights: Sequence[SourceLights], meshes: Sequence[Mesh], progres
     nearest = np.full(len(corners), NO_LIGHT, np.int64)
     if len(corners) and len(light_corners):
         for index, chosen in _meshes_by_lights(lights, len(meshes)):
-            step(progress, 0.5 * index / max(len(meshes), 1), "pairing lights and faces")
+            done = as_report(part(progress, 0.5 * index / len(meshes), 0.5), "pairing lights and faces")
+            done(0.0)
             triangles, known = chosen[mesh_of], np.flatnonzero(_stands_for(lights, index)[of_mesh])
-            nearest[triangles] = _near_enough(light_corners, known, corners[triangles])
+            nearest[triangles] = _near_enough(light_corners, known, corners[triangles], done)
     found = np.flatnonzero(nearest >= 0)
     pairs = [np.stack([face_of[nearest[found]], found], axis=1)]
     if len(corners):
@@ -86,10 +87,10 @@ def _stands_for(lights: Sequence[SourceLights], mesh: int) -> Bool:
     return np.array([mesh in each.meshes for each in lights], bool)
 
 
-def _near_enough(light_corners: Float64, known: Int64, corners: Float64) -> Int64:
+def _near_enough(light_corners: Float64, known: Int64, corners: Float64, report: Report) -> Int64:
     """(t,) the nearest of the light triangles `known`, NO_LIGHT where it is farther away than its longest edge or faces
     another way: the walls around a light on the floor are not what it stands for."""
-    nearest = light_of_triangles(light_corners[known], corners)
+    nearest = light_of_triangles(light_corners[known], corners, report)
     rows = np.flatnonzero(nearest >= 0)
     own = light_corners[known[nearest[rows]]]
     edges = np.linalg.norm(own - np.roll(own, 1, axis=1), axis=2).max(axis=1)

@@ -18,7 +18,7 @@ from ...core.exact_tags import Tags, pair_exactly
 from ...core.light_links import make_links
 from ...core.light_mesh import VirtualLightMesh, empty_light_mesh
 from ...core.mesh_topology import Bool
-from ...core.progress import Progress
+from ...core.progress import Progress, as_report, part
 from ...core.scene import Int32
 from ...core.tag_pairs import living_tags, unpaired
 from ...core.thin_surface import thin_triangles
@@ -34,6 +34,9 @@ from .region_pairs import RegionPairs, SourceLights, region_pairs
 from .source_faces import NO_FACE, SourceFaces, read_source_faces
 from .source_tags import require_unchanged, write_face_tags
 from .stored_links import read_links, read_paired_links, write_links
+
+# Share of the work that is done when pairs are known and thin surfaces are yet to be.
+PAIRS_TIME = 0.6
 
 
 @dataclass(frozen=True)
@@ -161,8 +164,9 @@ def pair(tagging: Tagging, progress: Progress) -> Retagged:
 def pair_thin(tagging: Tagging, progress: Progress) -> Retagged:
     """The same for thin bodies and sheets seen from both sides alone (core/thin_surface.py)."""
     meshes = tagging.source.snapshot.meshes
-    pairs = region_pairs(tagging.lights, meshes, progress)
-    found = thin_triangles(meshes, _as_light_mesh(tagging.lights), pairs.nearest)
+    pairs = region_pairs(tagging.lights, meshes, part(progress, 0.0, PAIRS_TIME))
+    thin = as_report(part(progress, PAIRS_TIME, 1.0), "looking for thin surfaces")
+    found = thin_triangles(meshes, _as_light_mesh(tagging.lights), pairs.nearest, thin)
     needed = [thin | seen for thin, seen in zip(found.thin, found.two_sided, strict=True)]
     return _paired(tagging, pairs, np.concatenate([np.zeros(0, bool), *needed]))
 
