@@ -20,7 +20,7 @@ class VLM_OT_set_strength(Operator):  # noqa: N801 (Blender's naming of classes)
     strength: bpy.props.FloatProperty(
         name="Strength",
         description="Factor on what all lights send out: 5 makes the bounce five times as strong",
-        min=0.0,
+        soft_min=0.0,
         soft_max=10.0,
         default=1.0,
     )
@@ -29,7 +29,7 @@ class VLM_OT_set_strength(Operator):  # noqa: N801 (Blender's naming of classes)
         description="Factor on each channel; white changes nothing",
         subtype="COLOR",
         size=3,
-        min=0.0,
+        soft_min=0.0,
         default=(1.0, 1.0, 1.0),
     )
 

@@ -96,7 +96,7 @@ def bake(
 
     faces: where given, a new light mesh and its surface get tags by which each face leaves out the lights that stand
     for it. keep: lights that stay as they are, first in the new light mesh, and count. Raises InvalidInput where the
-    scene shows no surface to make lights of, or `existing` holds values that are not finite or negative, for fewer
+    scene shows no surface that gets any light, or `existing` holds values that are not finite or negative, for fewer
     lights than are kept, and for more links than there can be; Cancelled.
     """
     creation, face_tags, meshes, paired_links = None, None, snapshot.meshes, None
@@ -112,6 +112,9 @@ def bake(
         shape = replace(chosen, target_triangles=max(chosen.shape_lights, min(locked + 1, chosen.target_triangles)))
         created = create_light_mesh(snapshot.meshes, shape, progress, keep)
         light_mesh, creation = created.light_mesh, created.report
+        if not len(light_mesh):
+            problem = "none of its surface gets a light: it has no area, or is painted with None Here"
+            raise InvalidInput(f"scene {snapshot.name!r}", problem, "choose other surfaces, or paint less of None Here")
         if faces is not None:
             light_mesh, tags = tagged_by_map(light_mesh, created.light_of_triangle, faces)
             face_tags, paired_links = tags.face_tags, tags.paired

@@ -134,6 +134,13 @@ def test_strength_and_hue_leave_the_faces_alone(lights):
     assert np.array_equal(colors(lights), before)
 
 
+def test_a_strength_with_which_colours_overflow_is_refused(lights):
+    """Blender makes the largest float32 of an infinite number that a script gives an operator."""
+    with pytest.raises(InvalidInput, match=r"would send out 7.8e\+38, more than can be stored"):
+        light_colors.set_strength([lights], 3.4028234663852886e38, (1.0, 1.0, 1.0))
+    assert light_colors.strength_of(lights) == (1.0, (1.0, 1.0, 1.0))
+
+
 @pytest.mark.parametrize(("strength", "hue"), [(-1.0, (1, 1, 1)), (np.nan, (1, 1, 1)), (1.0, (1, np.inf, 1))])
 def test_a_strength_that_no_light_can_have_is_refused(lights, strength, hue):
     with pytest.raises(InvalidInput, match="strength and hue"):

@@ -85,6 +85,12 @@ def test_lights_at_one_place_along_the_direction_are_refused():
         color_changes.extent_along(rows((0, 0, 0), (1, 1, 0)), (0, 0, 1))
 
 
+def test_an_extent_that_placement_alone_has_made_is_none():
+    middles = rows((0, 0, -1e-6), (4, 1, 2e-6), (2, 3, 0))
+    with pytest.raises(InvalidInput, match="same place along its direction; choose another one, such as X, .* 4 m"):
+        color_changes.extent_along(middles, (0, 0, 1))
+
+
 def test_a_gradient_between_one_point_is_refused():
     with pytest.raises(InvalidInput, match="two different points"):
         color_changes.gradient((1, 1, 1), (1, 1, 1), (0, 0, 0), (1, 1, 1))

@@ -21,7 +21,14 @@ from .light_faces import chosen_faces, read_faces, write_faces
 from .light_factors import NEUTRAL_HUE, NEUTRAL_STRENGTH, describe_factors
 from .light_geometry import LightFaces, light_faces_in_world
 from .light_meshes import require_editable
-from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, HUE_PROPERTY, LOCK_ATTRIBUTE, STRENGTH_PROPERTY
+from .names import (
+    AREA_SCALE_ATTRIBUTE,
+    COLOR_ATTRIBUTE,
+    EMISSION_ATTRIBUTE,
+    HUE_PROPERTY,
+    LOCK_ATTRIBUTE,
+    STRENGTH_PROPERTY,
+)
 from .stored_values import factors
 
 COLOR, EMISSION, BOTH = "COLOR", "EMISSION", "BOTH"
@@ -155,12 +162,22 @@ def set_strength(things: Sequence[Any], strength: float, hue: Sequence[float]) -
         require_editable(thing)
         subject = f"light mesh {thing.name!r}, strength and hue"
         require_colors(np.array([[strength] * 3, list(hue)], np.float64), subject)
+        most = strength * max(hue) * _brightest(thing)
+        if not most <= color_changes.LARGEST:
+            raise InvalidInput(subject, f"its lights would send out {most:.2g}, more than can be stored", "use less")
     for thing in things:
         thing[STRENGTH_PROPERTY] = float(strength)
         thing[HUE_PROPERTY] = tuple(float(value) for value in hue)
         describe_factors(thing)
         thing.update_tag()
     return len(things)
+
+
+def _brightest(thing: Any) -> float:
+    """The largest value of any light before strength and hue, of area made up for and of neither."""
+    scale = np.maximum(read_faces(thing, AREA_SCALE_ATTRIBUTE).astype(np.float64), 1.0)
+    faces = [read_faces(thing, name)[:, :3].max(axis=1, initial=0.0) * scale for name in ATTRIBUTES[BOTH]]
+    return float(np.concatenate(faces).max(initial=0.0))
 
 
 def strength_of(thing: Any) -> tuple[float, tuple[float, ...]]:

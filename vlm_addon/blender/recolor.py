@@ -14,6 +14,7 @@ from ..core.mesh_topology import Bool
 from ..core.progress import Progress
 from ..core.scene import Float64
 from .authoring import lights
+from .drawing.draw_points import LIKELY_SPAN, require_distance
 from .extraction.color_space import convert, rec709_to_working
 from .extraction.extract import ExtractOptions, extract_scene
 from .light_colors import ATTRIBUTES, FaceValues, chosen_areas, new_values, one_per_mesh, write_planned
@@ -140,6 +141,9 @@ def pick(context: Any, things: Sequence[Any], place: Place, quantity: str) -> in
 
     The surface is what the viewport shows. Raises InvalidInput.
     """
+    require_distance(place.radius, "radius")
+    if not (np.abs(place.location) <= LIKELY_SPAN).all():
+        raise InvalidInput("location", f"it is {place.location}", f"give metres up to {LIKELY_SPAN:g}")
     if place.kind == OBJECT:
         colors = _surface(place.source).of_all()
     else:

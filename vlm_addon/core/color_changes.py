@@ -17,6 +17,8 @@ from .scene import Float64
 ColorChange = Callable[[Float64, Float64], Float64]
 
 SIXTH = 1.0 / 6.0
+LEAST_EXTENT = 1e-4
+"""Of how far lights lie apart: along a direction in which they extend for less, only placement parts them."""
 LARGEST = float(np.finfo(np.float32).max)
 """The largest value that a face attribute holds."""
 
@@ -105,8 +107,12 @@ def extent_along(middles: Float64, direction: Sequence[float]) -> tuple[Float64,
         raise InvalidInput("gradient", f"its direction is {tuple(direction)}", "give one that is not zero")
     way = way / length
     places = middles @ way
-    if not places.max() > places.min():
-        raise InvalidInput("gradient", "all lights lie at the same place along its direction", "choose another one")
+    spans = np.ptp(middles, axis=0)
+    if not np.ptp(places) > LEAST_EXTENT * np.linalg.norm(spans):
+        remedy = "choose another one"
+        if spans.max() > 0.0:
+            remedy += f", such as {'XYZ'[int(spans.argmax())]}, along which they extend for {spans.max():.3g} m"
+        raise InvalidInput("gradient", "all lights lie at the same place along its direction", remedy)
     return places.min() * way, places.max() * way
 
 

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+LONGEST_PART = 300
+"""Characters of a part of a message: what was given may be of any length."""
+
 
 class VlmError(Exception):
     """Any failure a user can be told about in one sentence; ends a command with `exit_code`."""
@@ -16,10 +19,10 @@ class InvalidInput(VlmError):
     exit_code = 2
 
     def __init__(self, subject: str, problem: str, remedy: str) -> None:
-        super().__init__(f"{subject}: {problem}; {remedy}")
-        self.subject = subject
-        self.problem = problem
+        self.subject = shortened(subject)
+        self.problem = shortened(problem)
         self.remedy = remedy
+        super().__init__(f"{self.subject}: {self.problem}; {remedy}")
 
 
 class Cancelled(VlmError):
@@ -36,3 +39,11 @@ class DeviceError(VlmError):
 
 class ShaderError(DeviceError):
     """A shader did not compile or link; the message names file and line."""
+
+
+def shortened(text: str) -> str:
+    """`text` of at most LONGEST_PART characters: what is too long loses its middle."""
+    if len(text) <= LONGEST_PART:
+        return text
+    end = LONGEST_PART // 3
+    return f"{text[: LONGEST_PART - end - 5]} ... {text[-end:]}"

@@ -34,6 +34,7 @@ from ..write_back import write_light_mesh
 from .draw_looks import looks_under
 from .draw_mesh import edited, vertices_world
 from .draw_placement import Pieces, Placed, behind_surface, pieces_of
+from .draw_points import require_distance
 from .drawn_faces import Faces, faces_of
 
 NAME = "VLM Drawn"
@@ -68,6 +69,7 @@ def draw(
     what is needed. target: name of the light mesh, by default the active one, or else a new one. Points at vertices of
     the light mesh become these vertices. Raises InvalidInput; nothing is changed then.
     """
+    require_distance(offset, "offset")
     thing = find_target(context, target)
     if context.mode == "EDIT_MESH" and (thing is None or thing.mode != "EDIT"):
         # Its undo would leave them.

@@ -76,6 +76,12 @@ def exactly(points: str, count: int, what: str) -> Float64:
     return places
 
 
+def require_distance(value: float, what: str) -> None:
+    """Raises InvalidInput, naming `what`, where `value`, m, is no number or out of bounds."""
+    if not 0.0 <= value <= LIKELY_SPAN:
+        raise InvalidInput(what, f"it is {value:g} m", f"give metres from 0 to {LIKELY_SPAN:g}")
+
+
 def mean(normals: Float64) -> Float64:
     """(1, 3): the sum of directions; which side counts, not the length."""
     return normals.sum(axis=0, keepdims=True)

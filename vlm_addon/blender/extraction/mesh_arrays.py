@@ -12,6 +12,9 @@ from ...core.errors import InvalidInput
 from ...core.scene import Float32, Float64, Int32
 from ..names import TAG_ATTRIBUTE
 
+FARTHEST = 1e12
+"""Metres beyond which float32 cannot hold volumes: what is there is a mistake."""
+
 ATTRIBUTE_COMPONENTS = {"FLOAT": 1, "INT": 1, "BOOLEAN": 1, "FLOAT_COLOR": 4, "BYTE_COLOR": 4, "FLOAT_VECTOR": 3}
 ATTRIBUTE_FIELDS = {"FLOAT_COLOR": "color", "BYTE_COLOR": "color", "FLOAT_VECTOR": "vector"}
 
@@ -60,11 +63,11 @@ def face_attribute(mesh: Any, name: str, data_type: str) -> np.ndarray | None:
 
 
 def read_mesh(mesh: Any, owner: str) -> LocalMesh:
-    """The arrays of a Blender mesh. Raises InvalidInput, naming `owner`, where a vertex is not finite."""
+    """The arrays of a Blender mesh. Raises InvalidInput, naming `owner`, where a vertex is nowhere."""
     positions = read(mesh.vertices, "co", np.float32, 3).reshape(-1, 3)
-    finite = np.isfinite(positions).all(axis=1)
-    if not finite.all():
-        vertex = int(np.flatnonzero(~finite)[0])
+    placed = (np.abs(positions) <= FARTHEST).all(axis=1)
+    if not placed.all():
+        vertex = int(np.flatnonzero(~placed)[0])
         problem = f"vertex {vertex} is at {tuple(positions[vertex].tolist())}"
         raise InvalidInput(owner, problem, "delete the vertex or repair what moves it")
     mesh.calc_loop_triangles()

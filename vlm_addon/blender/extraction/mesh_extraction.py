@@ -15,7 +15,7 @@ from ..stored_values import whole_number
 from .color_space import into_rec709
 from .dynamics import is_dynamic
 from .materials import FindingList, MaterialTable, MaterialUse
-from .mesh_arrays import LocalMesh, flipped, place, read_mesh
+from .mesh_arrays import FARTHEST, LocalMesh, flipped, place, read_mesh
 from .painted_detail import painted_detail
 from .surface_value import IDENTITY_UV
 from .triangle_averages import TextureAverager, triangle_averages
@@ -86,8 +86,9 @@ class MeshExtractor:
 
     def _placeable(self, instance: Any, name: str, local: LocalMesh, matrix: Float64) -> bool:
         """False for an instance of zero scale. Raises InvalidInput for an object of zero scale."""
-        if not np.isfinite(matrix).all():
-            raise InvalidInput(f"object {name!r}", "its world matrix is not finite", "repair its transform")
+        if not (np.abs(matrix) <= FARTHEST).all():
+            problem = "is not finite" if not np.isfinite(matrix).all() else f"has numbers beyond {FARTHEST:g}"
+            raise InvalidInput(f"object {name!r}", f"its world matrix {problem}", "repair its transform")
         scale = np.linalg.norm(matrix[:3, :3], axis=0)
         extents = np.ptp(local.positions, axis=0)
         # A flat mesh may be flattened further along its own normal: nothing is lost.
