@@ -13,6 +13,7 @@ import numpy as np
 from ..bake import Bake, BakeSettings, bake
 from ..core.bake_key import surface_hashes
 from ..core.errors import InvalidInput, VlmError
+from ..core.light_marks import creation_marks
 from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.scene import Finding, SceneSnapshot
@@ -26,11 +27,15 @@ from .following import animation
 from .interface.availability import has_geometry, light_mesh_objects, rendered_objects
 from .interface.translation import told
 from .light_faces import write_faces
-from .light_meshes import source_names
-from .names import LOCK_ATTRIBUTE, NAME
+from .light_history import light_history
+from .light_meshes import is_local, readable_sources
+from .locked_lights import kept_lights
+from .names import LOCK_ATTRIBUTE, MARK_ATTRIBUTE, NAME
+from .source_changes import phrases
 from .tagging.source_faces import SourceFaces, read_source_faces
 from .tagging.source_tags import faces_to_tag, received_tags, require_unchanged, write_face_tags
 from .tagging.stored_links import mark_paired
+from .target_light_mesh import find_replaced, unused_name
 from .write_back import write_light_mesh
 
 TAG_REGIONS = {
@@ -50,7 +55,7 @@ class Made:
 
     name is None where the scene keeps the light meshes that it has, which are at `origins`. made_from: hashes of the
     surfaces, so that it can be told later whether they have changed. tagged: where new tags of them go, None without.
-    locked: how many lights, the first, were kept.
+    locked: how many lights, the first, were kept. gone: names of objects that it is not made from any more.
     """
 
     bake: Bake
@@ -61,6 +66,7 @@ class Made:
     made_from: Mapping[str, str] = field(default_factory=dict)
     tagged: SourceFaces | None = None
     locked: int = 0
+    gone: tuple[str, ...] = ()
 
 
 def from_selection(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
@@ -68,7 +74,7 @@ def from_selection(context: Any, settings: BakeSettings, tag_regions: bool = Fal
     things = [thing for thing in context.selected_objects if has_geometry(thing)]
     active = context.active_object
     named_after = active if active in things else things[0]
-    return from_objects(things, f"{NAME} {named_after.name}", settings, tag_regions)
+    return _in_its_place(things, f"{NAME} {named_after.name}", settings, tag_regions)
 
 
 def from_collection(collection: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
@@ -80,29 +86,48 @@ def from_collection(collection: Any, settings: BakeSettings, tag_regions: bool =
     if not things:
         problem = "none of its objects shows a surface in renders"
         raise InvalidInput(f"collection {collection.name!r}", problem, "put meshes into it, or choose another")
-    return from_objects(things, f"{NAME} {collection.name}", settings, tag_regions)
+    return _in_its_place(things, f"{NAME} {collection.name}", settings, tag_regions)
 
 
 def from_scene(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
     """Work that makes one light mesh of all that the scene shows, whatever light meshes it has."""
     things = [thing for thing in rendered_objects(context) if has_geometry(thing)]
-    return from_objects(things, NAME, settings, tag_regions)
+    return _in_its_place(things, NAME, settings, tag_regions)
+
+
+def _in_its_place(
+    things: list[Any], name: str, settings: BakeSettings, tag_regions: bool
+) -> Callable[[Progress], Made]:
+    """`from_objects` into the light mesh that stands for them already, around its locked lights, or into a new one.
+
+    Raises InvalidInput where more lights are locked than are asked for.
+    """
+    replaced = find_replaced(things, name, bpy.context.scene)
+    if replaced is None:
+        return from_objects(things, unused_name(name), settings, tag_regions)
+    keep = kept_lights(replaced, settings.target_triangles) if is_local(replaced) else None
+    return from_objects(things, replaced.name, settings, tag_regions, keep)
 
 
 def from_objects(
-    things: list[Any], name: str, settings: BakeSettings, tag_regions: bool, keep: VirtualLightMesh | None = None
+    things: list[Any],
+    name: str,
+    settings: BakeSettings,
+    tag_regions: bool,
+    keep: VirtualLightMesh | None = None,
+    gone: tuple[str, ...] = (),
 ) -> Callable[[Progress], Made]:
     """Work that makes the light mesh `name` of objects.
 
     tag_regions: let each face leave out just the lights that stand for it, as the simplification knows them. keep:
-    lights that stay as they are.
+    lights that stay as they are. gone: names of objects that it was made from and is not any more.
     """
     sources = tuple(thing.name for thing in things)
     options = ExtractOptions(objects=frozenset(sources))
     if not tag_regions:
-        return _work(extract_scene(options), name, sources, settings, None, keep)
+        return _work(extract_scene(options), name, sources, settings, None, keep, gone)
     tagged = read_source_faces(options).by_face()
-    return _work(tagged.snapshot, name, sources, settings, tagged, keep)
+    return _work(tagged.snapshot, name, sources, settings, tagged, keep, gone)
 
 
 def from_visible_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
@@ -123,7 +148,10 @@ def _work_on_scene(context: Any, found: Extraction, settings: BakeSettings) -> C
     if existing is None:
         sources = tuple(thing.name for thing in rendered_objects(context) if has_geometry(thing))
         return _work(snapshot, NAME, sources, settings)
-    return lambda progress: Made(bake(snapshot, existing, None, progress), snapshot.name, origins=found.origins)
+    history = light_history(context.scene, found)
+    return lambda progress: Made(
+        bake(snapshot, existing, None, progress, history=history), snapshot.name, origins=found.origins
+    )
 
 
 def _work(
@@ -133,6 +161,7 @@ def _work(
     settings: BakeSettings,
     tagged: SourceFaces | None = None,
     keep: VirtualLightMesh | None = None,
+    gone: tuple[str, ...] = (),
 ) -> Callable[[Progress], Made]:
     locked = len(keep) if keep is not None else 0
     kept = () if keep is None else (keep.tag_ids, keep.links[np.isin(keep.links[:, 0], keep.tag_ids)])
@@ -145,7 +174,7 @@ def _work(
     def work(progress: Progress) -> Made:
         made = bake(plain, None, settings, progress, faces, keep)
         hashes = surface_hashes(plain.meshes)
-        return Made(made, snapshot.name, name, sources, made_from=hashes, tagged=tagged, locked=locked)
+        return Made(made, snapshot.name, name, sources, made_from=hashes, tagged=tagged, locked=locked, gone=gone)
 
     return work
 
@@ -153,7 +182,8 @@ def _work(
 def write(made: Made) -> str:
     """Put what was made into Blender's data, with its findings; returns a sentence with counts."""
     scene = require_scene(made.scene)
-    findings = (*_counted_twice(scene, made), *made.bake.findings)
+    twice = _counted_twice(scene, made)
+    findings = (*twice, *made.bake.findings)
     count = lights(len(made.bake.light_mesh))
     if made.name is None or made.bake.creation is None:
         list_findings(scene, findings, made.origins)
@@ -161,6 +191,7 @@ def write(made: Made) -> str:
     if made.tagged is not None and made.bake.face_tags is not None:
         require_unchanged(made.tagged, made.bake.face_tags)
     followed = animation.followed_by(made.name, scene)
+    place = _place(made, scene)
     written = write_light_mesh(made.bake.light_mesh, made.name, made.sources, scene)
     if made.tagged is not None and made.bake.face_tags is not None:
         write_face_tags(made.tagged, made.bake.face_tags)
@@ -168,31 +199,38 @@ def write(made: Made) -> str:
         mark_paired(written, made.bake.paired_links)
     if made.locked:
         write_faces(written, LOCK_ATTRIBUTE, np.arange(len(made.bake.light_mesh)) < made.locked)
+    write_faces(written, MARK_ATTRIBUTE, creation_marks(made.bake.light_mesh))
     set_made_from(written, made.made_from)
     list_findings(scene, findings, origins_of(written))
     seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
     again = animation.follow_again(written, followed, bpy.context)
-    return f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s{again}"
+    missing = phrases(made.gone, [name for name in made.sources if name not in made.made_from])
+    notes = "".join(f"; {note}" for note in (*missing, *(finding.problem for finding in twice)))
+    return (
+        f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s{place}{again}{notes}"
+    )
+
+
+def _place(made: Made, scene: Any) -> str:
+    """What to say of the lights that are replaced."""
+    before = next((thing for thing in light_mesh_objects(scene) if thing.name == made.name), None)
+    if before is None:
+        return ""
+    kept = f"; {lights(made.locked)} of them locked and kept" if made.locked else ""
+    return f", in place of the {faces(len(before.data.polygons))} of {before.name}{kept}"
 
 
 def _counted_twice(scene: Any, made: Made) -> list[Finding]:
     """A finding for each light mesh of the scene that stands for some of the same objects."""
     findings = []
     for other in light_mesh_objects(scene):
-        shared = sorted(set(made.sources) & _readable_names(other))
+        known = {source.name for source in readable_sources(other, scene) if source is not None}
+        shared = sorted(set(made.sources) & known)
         if shared and other.name != made.name:
             which = f"{shared[0]!r} and {len(shared) - 1} more have" if len(shared) > 1 else f"{shared[0]!r} has"
             problem = f"{which} bounce light in {other.name!r} already, so it counts twice"
             findings.append(Finding(f"light mesh {made.name!r}", problem, "delete one of the two light meshes"))
     return findings
-
-
-def _readable_names(thing: Any) -> set[str]:
-    """Names of its sources, none where they cannot be read: what is made anew does not fail by another light mesh."""
-    try:
-        return set(source_names(thing))
-    except InvalidInput:
-        return set()
 
 
 def require_scene(name: str) -> Any:

@@ -4,22 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from ..bake import BakeSettings
 from ..core.errors import InvalidInput
-from ..core.light_mesh import VirtualLightMesh
 from ..core.progress import Progress
 from ..core.tag_pairs import FIRST_AUTOMATIC
 from .authoring import Made, from_objects
-from .extraction.color_space import convert, working_to_rec709
-from .extraction.light_mesh_io import extract
-from .light_faces import read_faces
-from .light_meshes import require_editable, sources, tags_of
-from .names import AREA_SCALE_ATTRIBUTE, COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, is_light_mesh
+from .light_meshes import require_editable, source_names, sources, tags_of
+from .locked_lights import kept_lights
+from .names import is_light_mesh
 
 
 def again_problem(context: Any) -> str | None:
@@ -47,33 +41,7 @@ def again(context: Any, settings: BakeSettings, tag_regions: bool) -> Callable[[
     require_editable(thing)
     tag_regions |= bool((tags_of(thing) >= FIRST_AUTOMATIC).any())
     things = [source for source in sources(thing, context.scene) if source is not None]
-    locked = read_faces(thing, LOCK_ATTRIBUTE) != 0
-    keep = locked_lights(thing, locked) if locked.any() else None
-    if keep is not None and len(keep) >= settings.target_triangles:
-        problem = f"{len(keep)} of its lights are locked, {settings.target_triangles} are asked for"
-        raise InvalidInput(f"light mesh {thing.name!r}", problem, "ask for more lights, or unlock some")
-    return from_objects(things, thing.name, settings, tag_regions, keep)
-
-
-def locked_lights(thing: Any, locked: Any) -> VirtualLightMesh:
-    """The lights of the faces `locked`, (faces,) bool, without the factors of the whole light mesh, which stay.
-
-    Raises InvalidInput where modifiers make the lights of `thing`: they cannot be told from each other.
-    """
-    found = extract()
-    if found.light_mesh is None or found.origins is None or thing.name not in found.origins.objects:
-        raise InvalidInput(f"light mesh {thing.name!r}", "it is hidden", "show it in the outliner")
-    owner = found.origins.objects.index(thing.name)
-    rows = found.origins.owner == owner
-    if (found.origins.faces[rows] < 0).any():
-        problem = "modifiers make its faces, so locked ones cannot be told"
-        raise InvalidInput(f"light mesh {thing.name!r}", problem, "apply its modifiers, or unlock its lights")
-    rows[rows] = locked[found.origins.faces[rows]]
-    faces = found.origins.faces[rows]
-    matrix = working_to_rec709()
-    values = {
-        "colour": convert(read_faces(thing, COLOR_ATTRIBUTE)[faces, :3], matrix),
-        "emission": convert(read_faces(thing, EMISSION_ATTRIBUTE)[faces, :3], matrix),
-        "strength": read_faces(thing, AREA_SCALE_ATTRIBUTE)[faces],
-    }
-    return replace(found.light_mesh.subset(np.asarray(rows, bool)), **values)
+    known = zip(source_names(thing), sources(thing, context.scene), strict=True)
+    gone = tuple(name for name, source in known if source is None)
+    keep = kept_lights(thing, settings.target_triangles)
+    return from_objects(things, thing.name, settings, tag_regions, keep, gone)

@@ -177,12 +177,12 @@ def _references(thing: Any) -> list[tuple[Any, int]]:
         (light_mesh, index)
         for scene in bpy.data.scenes
         for light_mesh in light_meshes(scene)
-        for index, source in enumerate(_readable_sources(light_mesh, scene))
+        for index, source in enumerate(readable_sources(light_mesh, scene))
         if source == thing and is_local(light_mesh) and index < len(light_mesh.get(SOURCE_IDS_PROPERTY, ()))
     ]
 
 
-def _readable_sources(light_mesh: Any, scene: Any) -> list[Any | None]:
+def readable_sources(light_mesh: Any, scene: Any) -> list[Any | None]:
     """`sources`, none where they cannot be read: what is written for one light mesh does not fail by another."""
     try:
         return sources(light_mesh, scene)
