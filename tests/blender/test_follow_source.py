@@ -293,6 +293,22 @@ def test_each_source_that_moves_gets_a_light_mesh_of_its_own(make_cube, make_she
         assert np.abs(apart - INSET).max() < 1e-5, name
 
 
+def test_a_light_mesh_that_shares_its_mesh_keeps_the_lights_of_all_sources(make_cube, scene):
+    for name, x in (("A", 0.0), ("B", 5.0)):
+        cube = make_cube(name)
+        cube.location.x = x
+        cube.keyframe_insert("location", frame=1)
+    sources = [bpy.data.objects[name] for name in "AB"]
+    surface = evaluated_surface(sources, bpy.context.evaluated_depsgraph_get())
+    lights = light_mesh_of(surface.positions, surface.triangles, "VLM", sources)
+    twin = lights.copy()
+    scene.collection.objects.link(twin)
+    before = place(twin)
+    assert len(follow_sources(lights, bpy.context)) == 2
+    assert len(twin.data.polygons) == 24
+    assert np.array_equal(place(twin), before)
+
+
 def test_the_light_mesh_named_after_a_source_keeps_its_lights(make_cube, scene):
     for name, x in (("A", 0.0), ("B", 5.0)):
         cube = make_cube(name)

@@ -62,6 +62,7 @@ def follow_sources(thing: Any, context: Any, chosen: Sequence[Any] = (), way: st
     stop_following(thing, context)
     if chosen:
         set_sources(thing, [source.name for source in found], context.scene)
+    _own_mesh(thing)
     parts = [(thing, found[0])] if len(found) == 1 else separate_by_source(thing, found, moving, context)
     return [_bind(part, source, context, way) for part, source in parts]
 
@@ -123,7 +124,6 @@ def _bind(thing: Any, source: Any, context: Any, way: str) -> Following:
     matrix = np.array(thing.matrix_world, np.float64)
     wanted = to_world(shape(thing), matrix)
     near = nearest(surface, wanted, _normals(thing, wanted, matrix))
-    _own_mesh(thing)
     local_matrix = np.array(source.matrix_world, np.float64)
     local = to_world(wanted, np.linalg.inv(local_matrix))
     set_shape(thing, local)
