@@ -1,31 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sits inside Blender's window and draws lights into the Cornell box with mouse and keys, with each drawing tool.
+"""Draws lights into the Cornell box with mouse and keys, with each drawing tool.
 
-Run by test_drawing_window.py: `blender … --enable-event-simulate --python drive_drawing.py -- ZIP FOLDER`; FOLDER holds
-cornell_box.blend. Writes FOLDER/story.json: what each stroke made and how long our own callbacks took, and screenshots.
+Played by test_drawing_window.py; see window_steps.py. FOLDER holds cornell_box.blend. STORY: what each stroke made and
+how long our own callbacks took; screenshots.
 """
 
-import json
 import math
-import subprocess
 import sys
 import time
-import traceback
-from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy_extras.view3d_utils import location_3d_to_region_2d
+from window_steps import (
+    FOLDER,
+    MODULE,
+    SECONDS_FOR_AN_EVENT,
+    SECONDS_FOR_REDRAW,
+    STORY,
+    at,
+    choose,
+    click,
+    drag,
+    framed,
+    in_view,
+    install,
+    light_meshes,
+    look,
+    move,
+    press,
+    run,
+    view,
+    window,
+)
 
-ZIP, FOLDER = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-PACKAGE = "bl_ext.user_default.virtual_light_mesh"
-SECONDS_FOR_REDRAW = 0.4
-SECONDS_FOR_AN_EVENT = 0.06
 STEPS = 10
 SEGMENTS, RINGS = 512, 257
 """A ball of these has 262,144 triangles."""
 TEXELS = 2048
-STORY = {"version": bpy.app.version_string, "made": {}, "milliseconds": {}}
 
 POLYGONS = {
     "back wall": [(0.3, 0.28), (0.46, 0.28), (0.46, 0.37), (0.3, 0.37)],
@@ -41,66 +52,6 @@ POLYGONS = {
 """Corners in the camera's frame, from its upper left."""
 
 
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def view():
-    """The largest 3D view and its main region."""
-    areas = [area for area in window().screen.areas if area.type == "VIEW_3D"]
-    area = max(areas, key=lambda each: each.width * each.height)
-    return area, next(region for region in area.regions if region.type == "WINDOW")
-
-
-def in_view():
-    area, region = view()
-    return bpy.context.temp_override(window=window(), area=area, region=region)
-
-
-def at(world):
-    """Where a point in the world shows, in the window."""
-    area, region = view()
-    x, y = location_3d_to_region_2d(region, area.spaces.active.region_3d, world)
-    return int(region.x + x), int(region.y + y)
-
-
-def framed(u, v):
-    """Where a place in the camera's frame shows."""
-    scene = bpy.context.scene
-    corners = [scene.camera.matrix_world @ corner for corner in scene.camera.data.view_frame(scene=scene)]
-    right, low, left = corners[0], corners[1], corners[3]
-    return at(left + u * (right - left) + v * (low - right))
-
-
-def event(kind, value, place, **more):
-    window().event_simulate(type=kind, value=value, x=place[0], y=place[1], **more)
-
-
-def press(key, place, **modifiers):
-    event(key, "PRESS", place, **modifiers)
-    event(key, "RELEASE", place, **modifiers)
-
-
-def click(place):
-    event("MOUSEMOVE", "NOTHING", place)
-    event("LEFTMOUSE", "PRESS", place)
-    event("LEFTMOUSE", "RELEASE", place)
-
-
-def drag(places, name=None):
-    """A drag through `places`, with a screenshot before the button is let go."""
-    event("MOUSEMOVE", "NOTHING", places[0])
-    event("LEFTMOUSE", "PRESS", places[0])
-    for place in places[1:]:
-        event("MOUSEMOVE", "NOTHING", place)
-        yield SECONDS_FOR_AN_EVENT
-    if name:
-        yield SECONDS_FOR_REDRAW
-        look(name)
-    event("LEFTMOUSE", "RELEASE", places[-1])
-    yield SECONDS_FOR_REDRAW
-
-
 def line(first, last):
     shares = np.linspace(0.0, 1.0, STEPS)
     return [tuple(int(a + share * (b - a)) for a, b in zip(first, last, strict=True)) for share in shares]
@@ -112,16 +63,6 @@ def polygon(corners, end="click"):
         yield SECONDS_FOR_AN_EVENT
     click(corners[0]) if end == "click" else press(end, corners[-1])
     yield SECONDS_FOR_REDRAW
-
-
-def look(name):
-    for area in window().screen.areas:
-        area.tag_redraw()
-    subprocess.run(["import", "-window", "root", str(FOLDER / f"drawing_{name}.png")], check=True)
-
-
-def light_meshes():
-    return [thing for thing in bpy.context.scene.objects if "vlm_schema" in thing]
 
 
 def lights():
@@ -147,7 +88,7 @@ def made(name, before):
 
 def trace():
     """Time the callbacks of strokes, by event: wall clock, and processor time of the thread."""
-    stroke = sys.modules[f"{PACKAGE}.vlm_addon.blender.drawing.draw_modal"].ModalStroke
+    stroke = sys.modules[f"{MODULE}.vlm_addon.blender.drawing.draw_modal"].ModalStroke
     handled = stroke._handled
 
     def timed(self, context, event):
@@ -168,9 +109,7 @@ def open_box():
     yield SECONDS_FOR_REDRAW
     for thing in light_meshes():
         bpy.data.objects.remove(thing)
-    for thing in bpy.context.selected_objects:
-        thing.select_set(False)
-    bpy.context.view_layer.objects.active = None
+    choose()
     space = view()[0].spaces.active
     space.region_3d.view_perspective = "CAMERA"
     space.shading.color_type = "MATERIAL"
@@ -186,9 +125,9 @@ def polygons():
     for corner in corners:
         click(corner)
         yield SECONDS_FOR_AN_EVENT
-    event("MOUSEMOVE", "NOTHING", framed(0.32, 0.33))
+    move(framed(0.32, 0.33))
     yield SECONDS_FOR_REDRAW
-    look("1_polygon")
+    yield from look("1_polygon")
     STORY["before the end"] = lights()
     zoom = space.region_3d.view_camera_zoom
     press("WHEELUPMOUSE", corners[0])
@@ -209,7 +148,7 @@ def polygons():
     circle = [framed(0.63 + 0.04 * math.cos(a), 0.84 + 0.03 * math.sin(a)) for a in np.linspace(0.0, 6.0, 16)]
     yield from drag(circle)
     made("freehand on the ball", before)
-    look("2_ten_polygons")
+    yield from look("2_ten_polygons")
     before = lights()
     press("Z", corners[0], ctrl=True)
     yield SECONDS_FOR_REDRAW
@@ -225,12 +164,12 @@ def shapes():
     properties = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT").operator_properties("vlm.draw_rectangle")
     properties.columns, properties.rows = 3, 2
     before = lights()
-    yield from drag(line(framed(0.565, 0.265), framed(0.745, 0.565)), "3_rectangle")
+    yield from drag(line(framed(0.565, 0.265), framed(0.745, 0.565)), look("3_rectangle"))
     made("rectangle", before)
     tool("extrude_object")
     yield SECONDS_FOR_REDRAW
     before = lights()
-    yield from drag(line(framed(0.745, 0.335), framed(0.9, 0.36)), "4_extrude")
+    yield from drag(line(framed(0.745, 0.335), framed(0.9, 0.36)), look("4_extrude"))
     made("round the corner", before)
     tool("cut_object")
     yield SECONDS_FOR_REDRAW
@@ -240,9 +179,9 @@ def shapes():
     tool("erase_object")
     yield SECONDS_FOR_REDRAW
     before = lights()
-    yield from drag(line(framed(0.58, 0.3), framed(0.73, 0.31)), "5_erase")
+    yield from drag(line(framed(0.58, 0.3), framed(0.73, 0.31)), look("5_erase"))
     made("erase", before)
-    look("6_erased")
+    yield from look("6_erased")
 
 
 def other_views():
@@ -252,7 +191,7 @@ def other_views():
     yield SECONDS_FOR_REDRAW
     before = lights()
     yield from polygon([framed(*place) for place in ((0.56, 0.9), (0.66, 0.905), (0.65, 0.945), (0.55, 0.945))])
-    look("7_edit_mode")
+    yield from look("7_edit_mode")
     with in_view():
         bpy.ops.object.mode_set(mode="OBJECT")
         made("in edit mode", before)
@@ -264,7 +203,7 @@ def other_views():
     before = lights()
     yield from polygon([(middle[0] - 20, middle[1]), (middle[0] + 20, middle[1]), (middle[0], middle[1] + 20)])
     made("orthographic", before)
-    look("8_orthographic")
+    yield from look("8_orthographic")
 
 
 def heavy():
@@ -295,37 +234,17 @@ def heavy():
         before = lights()
         yield from polygon([(left, low), (left + 60, low), (left + 60, low + 50), (left, low + 50)], "RET")
         made(f"heavy {number + 1}", before)
-    look("9_heavy")
+    yield from look("9_heavy")
 
 
 def story():
     """The steps; each yield waits that many seconds while Blender runs on."""
-    bpy.ops.extensions.package_install_files(filepath=str(ZIP), repo="user_default", enable_on_install=True)
-    STORY["enabled"] = PACKAGE in bpy.context.preferences.addons
+    STORY.update({"enabled": install(), "made": {}, "milliseconds": {}})
     trace()
     for part in (open_box, polygons, shapes, other_views, heavy):
         STORY["part"] = part.__name__
         yield from part()
         STORY[f"left after {part.__name__}"] = len(window().modal_operators)
-    STORY["finished"] = True
 
 
-def run(steps):
-    """A timer callback that goes through `steps`, writes the story and quits."""
-
-    def advance():
-        try:
-            return next(steps)
-        except StopIteration:
-            pass
-        except BaseException:  # noqa: BLE001 (Blender would go on and never quit)
-            STORY["error"] = traceback.format_exc()
-        (FOLDER / "story.json").write_text(json.dumps(STORY, indent=1))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    return advance
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.app.timers.register(run(story()), first_interval=2.0, persistent=True)
+run(story())

@@ -1,66 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lights drawn with the mouse in Blender's window: drive_drawing.py draws, the tests read on.
 
-Blender is found as for test_window.py.
+Blender is found as blender_window.py says.
 """
 
-import json
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
-
+import numpy as np
 import pytest
 
-from tests.gui.test_window import ROOT, command
+from tests.gui.blender_window import ROOT, assert_ended_well, pixels
 
 pytestmark = pytest.mark.full
 
-MINUTES = 5
-DRIVE = Path(__file__).with_name("drive_drawing.py")
-CORNELL_BOX = ROOT / "sample_blends" / "cornell_box.blend"
+DRIVER = "drawing"
+MINUTES = 8
+FILES = (ROOT / "sample_blends" / "cornell_box.blend",)
 WALLS = {"back wall": 0, "red wall": 0, "green wall": 1}
 """The channel in which the wall reflects most."""
 
 
-@pytest.fixture(scope="module")
-def story(tmp_path_factory):
-    """What drive_drawing.py wrote, with `output` added."""
-    chroot = os.environ.get("VLM_BLENDER_CHROOT")
-    if not chroot and not (shutil.which("blender") and shutil.which("xvfb-run") and shutil.which("import")):
-        pytest.skip("no Blender with a window: set VLM_BLENDER_CHROOT, or install blender, xvfb and imagemagick")
-    folder = tmp_path_factory.mktemp("window")
-    outside = Path(tempfile.mkdtemp(prefix="vlm-drawing-", dir=f"{chroot}/root")) if chroot else folder
-    inside = Path("/root") / outside.name if chroot else folder
-    try:
-        subprocess.run([sys.executable, ROOT / "tools" / "package.py", "--output", outside], check=True)
-        (package,) = outside.glob("*-linux_x64.zip")
-        shutil.copy(DRIVE, outside / "drive.py")
-        shutil.copy(CORNELL_BOX, outside)
-        done = subprocess.run(
-            command(chroot, inside, package.name), capture_output=True, text=True, timeout=60 * MINUTES
-        )
-        output = done.stdout + done.stderr
-        if not (outside / "story.json").exists():
-            pytest.fail(f"Blender ended early:\n{output}")
-        keep = os.environ.get("VLM_SCREENSHOTS")
-        for path in [*outside.glob("*.png"), outside / "story.json"] if keep else ():
-            shutil.copy(path, keep)
-        return {**json.loads((outside / "story.json").read_text()), "output": output}
-    finally:
-        if chroot:
-            shutil.rmtree(outside)
-
-
-def test_the_story_came_to_its_end(story):
-    assert "error" not in story, story["error"]
-    assert story["finished"]
-
-
-def test_nothing_was_raised_on_the_way(story):
-    assert "Traceback" not in story["output"], story["output"]
+def test_the_story_came_to_its_end_and_nothing_was_raised_on_the_way(story):
+    assert_ended_well(story)
 
 
 def test_nothing_changes_before_a_stroke_ends_and_esc_leaves_nothing(story):
@@ -120,3 +79,10 @@ def test_it_works_in_edit_mode_and_in_orthographic_views(story):
 
 def test_no_stroke_is_left_running(story):
     assert [value for name, value in story.items() if name.startswith("left after")] == [0] * 5
+
+
+def test_the_header_tells_of_a_stroke_and_is_blenders_again_after_it(story):
+    names = ("1_polygon", "2_ten_polygons", "7_edit_mode")
+    amid, after, later = (pixels(story["folder"] / f"{name}.png")[56:78, 8:250] for name in names)
+    assert not np.array_equal(amid, after)
+    assert np.array_equal(after, later)

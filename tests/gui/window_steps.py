@@ -23,6 +23,7 @@ SECONDS_FOR_AN_EVENT = 0.06
 SECONDS_BETWEEN_LOOKS = 0.05
 SECONDS_UNTIL_SHOWN = 2.0
 LONGEST_WAIT_SECONDS = 90.0
+DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 STORY = {"version": bpy.app.version_string, "seen": []}
 """What the tests read: each story adds its own."""
 
@@ -57,12 +58,17 @@ def at(world):
     return int(region.x + x), int(region.y + y)
 
 
-def framed(u, v):
-    """Where a place in the camera's frame shows, from its upper left."""
+def in_frame(u, v):
+    """The point in the world of a place in the camera's frame, from its upper left."""
     scene = bpy.context.scene
     corners = [scene.camera.matrix_world @ corner for corner in scene.camera.data.view_frame(scene=scene)]
     right, low, left = corners[0], corners[1], corners[3]
-    return at(left + u * (right - left) + v * (low - right))
+    return left + u * (right - left) + v * (low - right)
+
+
+def framed(u, v):
+    """Where a place in the camera's frame shows, in the window."""
+    return at(in_frame(u, v))
 
 
 def event(kind, value, place, **more):
@@ -79,6 +85,17 @@ def press(key, place=None, **modifiers):
     move(place)
     event(key, "PRESS", place, **modifiers)
     event(key, "RELEASE", place, **modifiers)
+
+
+def type_text(text, place=None):
+    """Letters, digits, spaces and points, with the mouse at a place; over the 3D view where none is given."""
+    place = place or middle_of_view()
+    names = dict(zip("0123456789. ", (*DIGITS, "PERIOD", "SPACE"), strict=True))
+    for letter in text:
+        name = names.get(letter, letter.upper())
+        event(name, "PRESS", place, unicode=letter)
+        event(name, "RELEASE", place)
+        yield SECONDS_FOR_AN_EVENT
 
 
 def click(place, **modifiers):
