@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
+from vlm_addon.blender.extraction.evaluation import with_render_depsgraph
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import select_faces
 from vlm_addon.blender.tagging import links
@@ -144,6 +145,25 @@ def test_unlinking_takes_away_the_pairs_of_the_receiver_or_all(make_plane, make_
     assert unlink().pairs == 1
     assert "vlm_links" not in lights
     assert unlink().pairs == 0
+
+
+def links_in_render():
+    """The links that the next F12 reads, of light meshes that are hidden from renders."""
+    bpy.context.view_layer.update()
+    return with_render_depsgraph(
+        bpy.context.scene, bpy.context.view_layer, lambda graph: extract(depsgraph=graph).light_mesh.links.tolist()
+    )
+
+
+def test_a_render_knows_new_links_and_tags_and_forgets_old_ones(make_plane, make_lights):
+    floor, lights = make_plane("floor"), make_lights(tags=(3, 3))
+    choose(lights, floor)
+    assert links_in_render() == []
+    link()
+    assert links_in_render() == [[3, 4]]
+    assert floor.evaluated_get(bpy.context.evaluated_depsgraph_get())["vlm_tag"] == 4
+    unlink()
+    assert links_in_render() == []
 
 
 def test_a_pair_that_another_light_mesh_stores_is_taken_away_there(make_plane, make_lights):

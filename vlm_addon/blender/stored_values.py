@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Custom properties of objects, which anybody can change: read as what they should be, or said to be something else."""
+"""Custom properties of objects, which anybody can change: read as what they should be, or said to be something else;
+and set so that evaluated copies, from which renders and overlays read, have them."""
 
 from __future__ import annotations
 
@@ -92,6 +93,19 @@ def plain(stored: Any) -> Any:
         if hasattr(stored, convert):
             return getattr(stored, convert)()
     return stored
+
+
+def set_value(thing: Any, name: str, value: Any) -> None:
+    """Store a custom property so that the next evaluation of the object has it: Blender notices none by itself."""
+    thing[name] = value
+    thing.update_tag()
+
+
+def remove_value(thing: Any, name: str) -> None:
+    """Take a custom property away, for the next evaluation as well."""
+    if name in thing:
+        del thing[name]
+        thing.update_tag()
 
 
 def wrong_value(thing: Any, name: str, wanted: str) -> InvalidInput:

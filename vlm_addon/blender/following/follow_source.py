@@ -24,6 +24,7 @@ from ..extraction.mesh_arrays import read
 from ..extraction.temporary import restored
 from ..light_meshes import keep_places, require_editable, set_sources, sources
 from ..names import DYNAMIC_PROPERTY
+from ..stored_values import set_value
 from .follow_rig import PREFIX, add_first, copy_rig, is_following, mark, remove_rig, rig_problem
 from .rest_shape import evaluated_shape, find_rest, set_shape, shape
 from .separate_lights import has_lights_of, separate_by_source
@@ -111,7 +112,7 @@ def stop_following(thing: Any, context: Any) -> bool:
     remove_rig(thing)
     set_shape(thing, positions)
     _move_to(thing, None, np.array(thing.matrix_world, np.float64))
-    thing[DYNAMIC_PROPERTY] = is_dynamic(thing)
+    set_value(thing, DYNAMIC_PROPERTY, is_dynamic(thing))
     keep_places(thing, context.scene)
     return True
 
@@ -140,7 +141,7 @@ def _bind(thing: Any, source: Any, context: Any, way: str) -> Following:
         _copy_rig_of(thing, source, depsgraph, surface, near.triangles, near.weights)
     with _without_other_modifiers(thing):
         off = find_rest(thing, local, context)
-    thing[DYNAMIC_PROPERTY] = is_dynamic(thing)
+    set_value(thing, DYNAMIC_PROPERTY, is_dynamic(thing))
     keep_places(thing, context.scene)
     mean = float(near.distances.mean())
     return Following(thing.name, source.name, SURFACE if by_surface else RIG, len(local), off, mean, note)

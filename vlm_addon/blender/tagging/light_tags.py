@@ -23,6 +23,7 @@ from ..light_colors import one_per_mesh
 from ..light_faces import chosen_faces, read_faces, write_faces
 from ..light_meshes import LARGEST_ID, is_local, require_editable, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
+from ..stored_values import remove_value, set_value
 from .stored_links import read_links, write_links
 
 
@@ -116,10 +117,9 @@ def _tag(things: Sequence[Any], tag: int) -> Tagged:
             lights, faces = (lights + changed, faces) if is_light_mesh(thing) else (lights, faces + changed)
             continue
         if tag != UNTAGGED:
-            thing[TAG_PROPERTY] = tag
-        elif TAG_PROPERTY in thing:
-            del thing[TAG_PROPERTY]
-        thing.update_tag()
+            set_value(thing, TAG_PROPERTY, tag)
+        else:
+            remove_value(thing, TAG_PROPERTY)
         objects += 1
         if thing.type == "MESH" and read_faces(thing, TAG_ATTRIBUTE).any():
             users = {each.name for each in bpy.data.objects if each.data == thing.data}

@@ -24,7 +24,7 @@ from ..interface.availability import has_geometry
 from ..light_faces import chosen_faces, read_faces, write_faces
 from ..light_meshes import chosen_light_meshes, is_local, light_meshes, new_tags, require_editable, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
-from ..stored_values import whole_number
+from ..stored_values import set_value, whole_number
 from .light_tags import tags_of_lights
 from .stored_links import read_links, read_paired_links, write_links
 from .unused_ids import forget_unused
@@ -96,7 +96,7 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
         tags[each.faces & (tags == UNTAGGED)] = light_ids[each.mesh]
         write_faces(each.thing, TAG_ATTRIBUTE, tags)
     for thing in bare:
-        thing[TAG_PROPERTY] = receiver_ids[thing.name_full]
+        set_value(thing, TAG_PROPERTY, receiver_ids[thing.name_full])
     for thing in things:
         if thing.name in links:
             write_links(thing, links[thing.name])

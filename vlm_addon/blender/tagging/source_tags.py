@@ -17,6 +17,7 @@ from ...core.tag_pairs import SurfaceFaces, is_automatic, living_tags
 from ..light_faces import face_count
 from ..light_meshes import is_local
 from ..names import TAG_PROPERTY
+from ..stored_values import remove_value, set_value
 from .light_tags import tags_of_lights, unused_automatic_tag, write_tags
 from .other_lights import read_others
 from .source_faces import SourceFaces, TagPlace
@@ -78,10 +79,9 @@ def write_face_tags(source: SourceFaces, tags: Int32) -> tuple[int, int]:
             continue
         objects += 1
         if stored[place.first] == UNTAGGED:
-            del thing[TAG_PROPERTY]
+            remove_value(thing, TAG_PROPERTY)
         else:
-            thing[TAG_PROPERTY] = int(stored[place.first])
-        thing.update_tag()
+            set_value(thing, TAG_PROPERTY, int(stored[place.first]))
     return faces, objects
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...core.light_links import is_link, make_links
 from ...core.scene import Int32
 from ..names import LINKS_PROPERTY, PAIRED_LINKS_PROPERTY
-from ..stored_values import whole_numbers, wrong_value
+from ..stored_values import remove_value, set_value, whole_numbers, wrong_value
 
 
 def read_links(thing: Any) -> Int32:
@@ -46,6 +46,6 @@ def write_links(thing: Any, links: Int32, paired: Int32 | None = None) -> None:
     made = common_links(_read(thing, PAIRED_LINKS_PROPERTY) if paired is None else paired, links)
     for name, stored in ((LINKS_PROPERTY, links), (PAIRED_LINKS_PROPERTY, made)):
         if not len(stored):
-            thing.pop(name, None)
+            remove_value(thing, name)
         elif not np.array_equal(_read(thing, name), stored):
-            thing[name] = stored.ravel().tolist()
+            set_value(thing, name, stored.ravel().tolist())

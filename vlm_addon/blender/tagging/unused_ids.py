@@ -13,6 +13,7 @@ from ...core.tag_pairs import is_automatic
 from ..light_faces import read_faces
 from ..light_meshes import is_local, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
+from ..stored_values import remove_value
 from .light_tags import tags_of_lights, write_tags
 from .stored_links import read_links
 
@@ -34,8 +35,7 @@ def forget_unused(gone: Int32) -> None:
     received = np.setdiff1d(given[:, 1], np.concatenate([linked, of_lights]))
     for thing in surfaces:
         if thing.library is None and thing.override_library is None and thing.get(TAG_PROPERTY, UNTAGGED) in received:
-            del thing[TAG_PROPERTY]
-            thing.update_tag()
+            remove_value(thing, TAG_PROPERTY)
         if thing.type == "MESH":
             _forget_faces(thing, received)
 
