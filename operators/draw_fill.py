@@ -8,7 +8,7 @@ from ..vlm_addon.blender.drawing import draw_fill, draw_operators
 
 
 class VLM_OT_draw_fill(draw_operators.NewLights, Operator):  # noqa: N801 (Blender's naming of classes)
-    """Copy selected faces of visible meshes as lights behind them, with their colour and tag. Leaves Edit Mode"""
+    """Copy selected faces of visible meshes as lights behind them, with their color and tag. Leaves Edit Mode"""
 
     bl_idname = "vlm.draw_fill"
     bl_label = "Lights from Selected Faces"

@@ -8,7 +8,7 @@ from ..vlm_addon.blender.drawing import draw_gestures, draw_lights, draw_operato
 
 
 class VLM_OT_draw_polygon(draw_gestures.PolygonGesture, draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)
-    """Click the corners of a light on a surface, or drag around it. It takes colour and tag from the surface"""
+    """Click the corners of a light on a surface, or drag around it. It takes color and tag from the surface"""
 
     bl_idname = "vlm.draw_polygon"
     bl_label = "Draw Light Polygon"

@@ -9,7 +9,7 @@ from ..vlm_addon.blender.drawing import draw_gestures, draw_lights, draw_operato
 
 
 class VLM_OT_draw_rectangle(draw_gestures.RectangleGesture, draw_operators.NewLightsStroke, Operator):  # noqa: N801 (Blender's naming of classes)
-    """Drag a rectangle onto a surface, one light or a grid of them. They take colour and tag from the surface"""
+    """Drag a rectangle onto a surface, one light or a grid of them. They take color and tag from the surface"""
 
     bl_idname = "vlm.draw_rectangle"
     bl_label = "Draw Light Rectangle"

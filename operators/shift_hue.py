@@ -26,7 +26,7 @@ class VLM_OT_shift_hue(LightOperator, Operator):  # noqa: N801 (Blender's naming
     )
     saturation: bpy.props.FloatProperty(
         name="Saturation",
-        description="Factor on the saturation: 0 makes lights grey",
+        description="Factor on the saturation: 0 makes lights gray",
         min=0.0,
         soft_max=2.0,
         default=1.0,

@@ -226,7 +226,7 @@ APPROXIMATED = {
     "toon": lambda new: new("BsdfToon"),
     "hair": lambda new: new("BsdfHair"),
     "rough diffuse": lambda new: new("BsdfDiffuse", Roughness=0.5),
-    "coloured transparency": lambda new: new("BsdfTransparent", Color=RED),
+    "colored transparency": lambda new: new("BsdfTransparent", Color=RED),
     "bump": lambda new: new("BsdfDiffuse", [("Normal", new("Bump"))]),
     "transmission": lambda new: new("BsdfPrincipled", **{"Transmission Weight": 0.5}),
     "coat": lambda new: new("BsdfPrincipled", **{"Coat Weight": 0.5}),

@@ -87,7 +87,7 @@ def test_lights_at_one_place_along_the_direction_are_refused():
 
 def test_an_extent_that_placement_alone_has_made_is_none():
     middles = rows((0, 0, -1e-6), (4, 1, 2e-6), (2, 3, 0))
-    with pytest.raises(InvalidInput, match="same place along its direction; choose another one, such as X, .* 4 m"):
+    with pytest.raises(InvalidInput, match=r"same place along its direction; choose another one, such as X, .* 4 m"):
         color_changes.extent_along(middles, (0, 0, 1))
 
 

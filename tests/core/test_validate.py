@@ -41,18 +41,20 @@ def test_no_lights_says_what_to_do() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-@pytest.mark.parametrize("name", ["colour", "emission", "strength"])
-def test_value_that_is_not_finite_names_the_first_light(name: str, bad: float) -> None:
-    assert f"1 light has a {name} that is not finite (first: light 3" in only_problem(changed(name, 3, bad))
+@pytest.mark.parametrize(
+    ("name", "spoken"), [("colour", "a color"), ("emission", "an emission"), ("strength", "a strength")]
+)
+def test_value_that_is_not_finite_names_the_first_light(name: str, spoken: str, bad: float) -> None:
+    assert f"1 light has {spoken} that is not finite (first: light 3" in only_problem(changed(name, 3, bad))
 
 
 def test_vertex_that_is_not_finite() -> None:
     assert "a vertex that is not finite" in only_problem(changed("vertices", int(WALL.triangles[5, 0]), np.nan))
 
 
-@pytest.mark.parametrize("name", ["colour", "emission", "strength"])
-def test_negative_value(name: str) -> None:
-    assert f"a negative {name} (first: light 2" in only_problem(changed(name, 2, -0.25))
+@pytest.mark.parametrize(("name", "spoken"), [("colour", "color"), ("emission", "emission"), ("strength", "strength")])
+def test_negative_value(name: str, spoken: str) -> None:
+    assert f"a negative {spoken} (first: light 2" in only_problem(changed(name, 2, -0.25))
 
 
 def test_sample_that_is_not_finite() -> None:
@@ -190,4 +192,4 @@ def test_a_tag_that_a_link_uses_is_not_lost() -> None:
 
 def test_many_bad_lights_give_one_line() -> None:
     light_mesh = create_light_mesh([mesh_of(*grid(60, 60))], SimplifySettings(10_000)).light_mesh
-    assert "7200 lights have a negative colour" in only_problem(replace(light_mesh, colour=light_mesh.colour - 1))
+    assert "7200 lights have a negative color" in only_problem(replace(light_mesh, colour=light_mesh.colour - 1))

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..bake import Bake, BakeSettings, bake
 from ..core.bake_key import surface_hashes
+from ..core.counting import counted
 from ..core.errors import InvalidInput, VlmError
 from ..core.light_marks import creation_marks
 from ..core.light_mesh import VirtualLightMesh
@@ -206,9 +207,8 @@ def write(made: Made) -> str:
     again = animation.follow_again(written, followed, bpy.context)
     missing = phrases(made.gone, [name for name in made.sources if name not in made.made_from])
     notes = "".join(f"; {note}" for note in (*missing, *(finding.problem for finding in twice)))
-    return (
-        f"Made {count} from {made.bake.creation.source_triangles:,} triangles in {seconds:.1f} s{place}{again}{notes}"
-    )
+    triangles = counted(made.bake.creation.source_triangles, "triangle")
+    return f"Made {count} from {triangles} in {seconds:.1f} s{place}{again}{notes}"
 
 
 def _place(made: Made, scene: Any) -> str:
@@ -275,14 +275,14 @@ def allow(operator: Any, problem: str | None) -> bool:
 
 def lights(count: int) -> str:
     """A number of virtual lights in words."""
-    return "1 virtual light" if count == 1 else f"{count:,} virtual lights"
+    return counted(count, "virtual light")
 
 
 def faces(count: int) -> str:
     """A number of faces in words."""
-    return "1 face" if count == 1 else f"{count:,} faces"
+    return counted(count, "face")
 
 
 def counted_findings(count: int) -> str:
     """A number of findings in words."""
-    return "1 finding" if count == 1 else f"{count:,} findings"
+    return counted(count, "finding")

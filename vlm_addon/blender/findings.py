@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import finding_kinds as kinds
+from ..core.counting import counted
 from ..core.errors import InvalidInput
 from ..core.repair import can_fix
 from ..core.scene import Finding
@@ -84,7 +85,7 @@ def marked_faces(scene: Any, item: Any) -> dict[str, Int64]:
             raise InvalidInput(f"light mesh {mark.owner!r}", "it is gone or was renamed since the check", CHECK_AGAIN)
         now = face_count(present[mark.owner])
         if now != mark.face_count:
-            problem = f"it has {now} faces and had {mark.face_count} when it was checked"
+            problem = f"it has {counted(now, 'face')} and had {mark.face_count} when it was checked"
             raise InvalidInput(f"light mesh {mark.owner!r}", problem, CHECK_AGAIN)
         found[mark.owner] = numbers_in(parse_spans(mark.faces, "face", 0))
     return found

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core import color_changes
 from ..core.color_changes import ColorChange, require_colors
+from ..core.counting import counted
 from ..core.errors import InvalidInput
 from ..core.mesh_topology import Bool
 from ..core.scene import Float64
@@ -191,7 +192,7 @@ def strength_of(thing: Any) -> tuple[float, tuple[float, ...]]:
 
 def light_mesh_count(count: int) -> str:
     """A number of light meshes in words."""
-    return "1 light mesh" if count == 1 else f"{count:,} light meshes"
+    return counted(count, "light mesh")
 
 
 def one_per_mesh(things: Sequence[Any]) -> list[Any]:

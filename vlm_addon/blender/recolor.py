@@ -143,7 +143,7 @@ def pick(context: Any, things: Sequence[Any], place: Place, quantity: str) -> in
     """
     require_distance(place.radius, "radius")
     if not (np.abs(place.location) <= LIKELY_SPAN).all():
-        raise InvalidInput("location", f"it is {place.location}", f"give metres up to {LIKELY_SPAN:g}")
+        raise InvalidInput("location", f"it is {place.location}", f"give meters up to {LIKELY_SPAN:g}")
     if place.kind == OBJECT:
         colors = _surface(place.source).of_all()
     else:

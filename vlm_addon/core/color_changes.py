@@ -29,7 +29,7 @@ def require_colors(colors: Float64, subject: str) -> None:
     if wrong.any():
         row = int(np.argmax(wrong))
         found = tuple(float(value) for value in colors[row])
-        remedy = f"use values from 0 to {LARGEST:.2g}; Fill gives lights a colour whatever they had"
+        remedy = f"use values from 0 to {LARGEST:.2g}; Fill gives lights a color whatever they had"
         raise InvalidInput(subject, f"light {row} would be {found}", remedy)
 
 

@@ -37,7 +37,7 @@ def surface_means(meshes: Sequence[Mesh]) -> SurfaceMeans:
     area, reflected = 0.0, np.zeros(3)
     for mesh in meshes:
         if not np.isfinite(mesh.reflectance).all():
-            raise InvalidInput(f"mesh {mesh.name!r}", "what a material of it reflects is not finite", "mend its colour")
+            raise InvalidInput(f"mesh {mesh.name!r}", "what a material of it reflects is not finite", "mend its color")
         areas = triangle_areas(mesh.positions[mesh.triangles])
         area += float(areas.sum())
         reflected += areas @ mesh.reflectance.astype(np.float64)

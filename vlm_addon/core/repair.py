@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import finding_kinds as kinds
+from .counting import counted
 from .errors import InvalidInput
 from .light_mesh import VirtualLightMesh
 from .light_regions import facing, pushing_regions
@@ -289,7 +290,7 @@ def _only(regions: Rows, chosen: Bool) -> Rows:
 
 
 def _lights(count: int) -> str:
-    return "1 light" if count == 1 else f"{count:,} lights"
+    return counted(count, "light")
 
 
 _REPAIRS: dict[str, Callable[[_Work], Repair]] = {

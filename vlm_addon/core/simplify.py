@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .counting import counted, counted_verb
 from .errors import InvalidInput
 from .kept_lights import kept_regions
 from .light_mesh import VirtualLightMesh, empty_light_mesh, join
@@ -315,19 +316,24 @@ def _triple(values: Float64) -> tuple[float, float, float]:
 def _findings(report: SimplifyReport, lights: ReducedSurface, placement: Placement) -> tuple[Finding, ...]:
     found = list(_unlit(report.unlit_area))
     if report.shells_dropped:
-        problem = f"{report.shells_dropped} of {report.shells} separate pieces got no light of their own"
+        problem = f"of {counted(report.shells, 'separate piece')}, {report.shells_dropped} got no light"
         found.append(Finding("light mesh", problem, "their power went to lights nearby; ask for more lights"))
     if lights.merged_borders:
-        problem = f"{report.lights} lights are too few for every border between materials, tags and objects"
-        found.append(Finding("light mesh", problem, "colours were averaged across some; ask for more lights"))
+        problem = (
+            counted_verb(report.lights, "light", "is", "are")
+            + " too few for the borders of materials, tags and objects"
+        )
+        found.append(Finding("light mesh", problem, "colors were averaged across some; ask for more lights"))
     if report.closed_shells_after < report.closed_shells_before:
-        problem = f"{report.closed_shells_before - report.closed_shells_after} closed pieces are open now"
+        problem = counted_verb(
+            report.closed_shells_before - report.closed_shells_after, "closed piece", "is open now", "are open now"
+        )
         found.append(Finding("light mesh", problem, "ask for more lights"))
     if report.limited_lights:
         first, depth = int(np.argmax(placement.limited)), float(placement.depth[placement.limited].max())
         problem = (
-            f"{report.limited_lights} lights (first: {first}) cannot be placed behind their surface because the body "
-            f"is too thin; they stand up to {depth:.3g} m in front of it"
+            f"{counted(report.limited_lights, 'light')} (first: {first}) cannot be placed behind the surface because "
+            f"the body is too thin: up to {depth:.3g} m in front of it"
         )
         found.append(Finding("light mesh", problem, "give these parts and their lights a common tag, or more lights"))
     return tuple(found)

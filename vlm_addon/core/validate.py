@@ -26,6 +26,7 @@ from .triangle_tree import TriangleTree, build_tree
 Rows = npt.NDArray[Any]
 
 SUBJECT = "light mesh"
+SPOKEN = {"vertex": "a vertex", "strength": "a strength", "colour": "a color", "emission": "an emission"}
 # Triangles thinner than this (4 sqrt(3) area / sum of squared sides; 1 for equilateral) count as degenerate.
 LEAST_QUALITY = 1e-6
 # Depth in front of the source surface that counts, as a share of the size (square root of the area) of the light.
@@ -156,10 +157,11 @@ def _broken(light_mesh: VirtualLightMesh) -> list[Finding]:
     }
     for name, rows in values.items():
         bad = ~np.isfinite(rows).all(axis=1)
-        _append(found, bad, rows, f"a {name} that is not finite", "repair or delete them", kinds.NOT_FINITE)
+        _append(found, bad, rows, f"{SPOKEN[name]} that is not finite", "repair or delete them", kinds.NOT_FINITE)
     for name in ("colour", "emission", "strength"):
         bad = (values[name] < 0).any(axis=1)
-        _append(found, bad, values[name], f"a negative {name}", "use values of at least 0", kinds.NEGATIVE)
+        negative = f"a negative {SPOKEN[name].partition(' ')[2]}"
+        _append(found, bad, values[name], negative, "use values of at least 0", kinds.NEGATIVE)
     samples = light_mesh.samples
     finite = np.isfinite(samples.positions).all(axis=1) & np.isfinite(samples.normals).all(axis=1)
     finite &= np.isfinite(samples.weights)
@@ -219,7 +221,7 @@ def _bright(light_mesh: VirtualLightMesh) -> list[Finding]:
     # float32 means of a white surface may end one rounding step above 1.
     bright = (light_mesh.colour > 1.0 + 1e-6).any(axis=1)
     problem = "a reflectance above 1: more light leaves than arrives, which is not physical but allowed"
-    _append(found, bright, light_mesh.colour, problem, "lower the colour if this is not meant", kinds.BRIGHT)
+    _append(found, bright, light_mesh.colour, problem, "lower the color if this is not meant", kinds.BRIGHT)
     return found
 
 

@@ -12,6 +12,7 @@ import bpy
 
 from ...core.bake_key import BakeKey, grid_key
 from ...core.baked_visibility import BakedVisibility
+from ...core.counting import counted
 from ...core.errors import InvalidInput
 from ...core.progress import Progress
 from ...light_grid_bake import GridBake, bake_light_grid
@@ -93,7 +94,7 @@ def write(context: Any, baked: BakedGrid) -> tuple[Path, str]:
     # The scene may have been changed while the grid was baked: to know, it must be compared.
     bake_state.forget(context)
     size = _size_text(path.stat().st_size)
-    findings = f"; {len(baked.grid.findings)} findings" if baked.grid.findings else ""
+    findings = f"; {counted(len(baked.grid.findings), 'finding')}" if baked.grid.findings else ""
     return path, f"Baked {size}: {baked.grid.summary()}{findings}"
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
+from ...core.counting import counted, counted_verb
 from ...core.errors import InvalidInput
 from ...core.scene import Float64
 from ..light_faces import read_faces
@@ -86,7 +87,8 @@ def erase(context: Any, points: Float64, normals: Float64, radius: float) -> str
             with edited(thing) as mesh:
                 bmesh.ops.delete(mesh, geom=[face for face in mesh.faces if face.index in rows], context="FACES")
     if not erased and kept:
-        raise InvalidInput("stroke", f"the {kept} lights under it are locked", "unlock them first")
+        problem = counted_verb(kept, "light", "under it is locked", "under it are locked")
+        raise InvalidInput("stroke", problem, "unlock first")
     if not erased:
         raise InvalidInput("stroke", "no light is under it", "select the light mesh, or use a larger radius")
     locked_ones = f"; {kept} locked kept" if kept else ""
@@ -100,7 +102,8 @@ def cut(context: Any, points: Float64, normals: Float64) -> str:
     the way ends in is cut through. Returns a sentence with counts. Raises InvalidInput; nothing is changed then.
     """
     if len(points) < 2:
-        raise InvalidInput("cut", f"{len(points)} points are no way across", "give at least two")
+        problem = counted_verb(len(points), "point", "is no way across", "are no way across")
+        raise InvalidInput("cut", problem, "give at least two")
     ways = list(zip(points[:-1], points[1:], _means(normals), strict=True))
     require_all_editable(context)
     before = after = 0
@@ -114,7 +117,7 @@ def cut(context: Any, points: Float64, normals: Float64) -> str:
             after += len(mesh.faces)
     if after == before:
         raise InvalidInput("cut", "no unlocked light lies under it", "select the light mesh and cut across its lights")
-    return f"Cut {after - before} time{'s' if after - before > 1 else ''}: {after} lights"
+    return f"Cut {counted(after - before, 'time')}: {counted(after, 'light')}"
 
 
 def require_all_editable(context: Any) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.counting import counted
 from ...core.errors import InvalidInput
 from ...core.mesh_topology import Rows
 from ...core.placement import insets, intrusions, place_behind
@@ -56,7 +57,7 @@ def fill(context: Any, target: str = "") -> str:
     thin = (
         f"; {made.in_front} in front of their surface: thin or sharply curved, give both a tag" if made.in_front else ""
     )
-    return f"Made {light_count(added)} of {len(made.faces.corners)} faces, in {written.name}{thin}"
+    return f"Made {light_count(added)} of {counted(len(made.faces.corners), 'face')}, in {written.name}{thin}"
 
 
 def _light_mesh_of(things: list[Any], scene: Any) -> Any | None:

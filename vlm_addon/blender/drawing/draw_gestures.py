@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.counting import counted
 from ...core.errors import InvalidInput
 from ...core.scene import Float64
 from ..light_meshes import chosen_light_meshes
@@ -43,7 +44,7 @@ class PolygonGesture(ModalStroke):
     def status(self, places: list[Place]) -> str:
         """Number of corners and area."""
         area = plane_of(_locations(places))[1] if len(places) > 2 else 0.0
-        return f"{len(places)} corners, {area:.3g} m²  ·  click the first corner to finish"
+        return f"{counted(len(places), 'corner')}, {area:.3g} m²  ·  click the first corner to finish"
 
     def closes(self, places: list[Place], place: Place) -> bool:
         """On the first corner."""
@@ -160,7 +161,7 @@ class CutGesture(ModalStroke):
 
     def status(self, places: list[Place]) -> str:
         """How many points there are."""
-        return f"{len(places)} points  ·  click across lights, or drag"
+        return f"{counted(len(places), 'point')}  ·  click across lights, or drag"
 
 
 class EraseGesture(ModalStroke):

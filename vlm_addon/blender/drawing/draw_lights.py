@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ...core.counting import counted
 from ...core.errors import InvalidInput
 from ...core.light_mesh import empty_light_mesh
 from ...core.scene import Float32, Float64
@@ -253,13 +254,13 @@ def _add_faces(thing: Any, faces: Faces) -> list[int]:
 
 def light_count(count: int) -> str:
     """A number of lights in words."""
-    return "1 light" if count == 1 else f"{count:,} lights"
+    return counted(count, "light")
 
 
 def _sentence(made: NewLights, thing: Any, count: int) -> str:
     parts = [f"Drew {light_count(count)} into {thing.name}"]
     if made.without_surface:
-        parts.append(f"{made.without_surface} without a surface under them, grey")
+        parts.append(f"{made.without_surface} without a surface under them, gray")
     if made.from_behind:
         parts.append("on the back of the surface, which sends out no light: turn its normals (Mesh > Normals > Flip)")
     if made.in_front:

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.brdf import albedo_table
+from ...core.counting import counted
 from ...core.scene import Float64
 from ..background_work import BackgroundWork
 from ..names import is_light_mesh
@@ -60,7 +61,7 @@ class ModalStroke:
 
     def status(self, places: list[Place]) -> str:
         """What the header says of the stroke so far."""
-        return f"{len(places)} points"
+        return counted(len(places), "point")
 
     def closes(self, places: list[Place], place: Place) -> bool:
         """Whether a click at `place` ends the stroke."""

@@ -13,7 +13,7 @@ from ..light_meshes import is_local
 from ..names import is_light_mesh
 from .draw_fill import fill_sources
 
-POINTS = 'in world space, metres, as "x y z, x y z"'
+POINTS = 'in world space, meters, as "x y z, x y z"'
 
 
 class Carried:

@@ -33,7 +33,7 @@ def rows_of(text: str, what: str) -> Float64:
     if len(values) % 3:
         raise InvalidInput(what, f"{len(values)} numbers are not three to a point", 'give them as "x y z, x y z"')
     if not (np.abs(values) <= LIKELY_SPAN).all():
-        raise InvalidInput(what, f"a number is not finite or beyond {LIKELY_SPAN:g}", "give points in metres")
+        raise InvalidInput(what, f"a number is not finite or beyond {LIKELY_SPAN:g}", "give points in meters")
     return values.reshape(-1, 3)
 
 
@@ -79,7 +79,7 @@ def exactly(points: str, count: int, what: str) -> Float64:
 def require_distance(value: float, what: str) -> None:
     """Raises InvalidInput, naming `what`, where `value`, m, is no number or out of bounds."""
     if not 0.0 <= value <= LIKELY_SPAN:
-        raise InvalidInput(what, f"it is {value:g} m", f"give metres from 0 to {LIKELY_SPAN:g}")
+        raise InvalidInput(what, f"it is {value:g} m", f"give meters from 0 to {LIKELY_SPAN:g}")
 
 
 def mean(normals: Float64) -> Float64:

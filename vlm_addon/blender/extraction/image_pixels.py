@@ -42,7 +42,7 @@ def image_pixels(
     if image.is_float:
         return _float_pixels(pixels, image, straight_alpha, np.eye(3) if space in RAW_SPACES else to_rec709)
     if space not in (*RAW_SPACES, *LINEAR_REC709_SPACES, "sRGB"):
-        report(f"image {image.name!r} is in colour space {space!r}", "read as sRGB")
+        report(f"image {image.name!r} is in color space {space!r}", "read as sRGB")
     levels = np.linspace(0.0, 1.0, 256, dtype=np.float32)
     decode = levels if space in (*RAW_SPACES, *LINEAR_REC709_SPACES) else srgb_to_linear(levels)
     return _byte_pixels(np.rint(pixels * 255.0).astype(np.uint8), image, straight_alpha, decode)

@@ -117,7 +117,7 @@ def _color(lamp: Any, evaluator: NodeEvaluator, to_rec709: Float64, owner: str) 
     report = evaluator.report
     if found.node.type != "EMISSION":
         label = node_label(owner, found.node)
-        report(label, f"{found.node.bl_label} is not simulated", "the lamp's own colour is used")
+        report(label, f"{found.node.bl_label} is not simulated", "the lamp's own color is used")
         return color
     values = [evaluator.color(found.input("Color"), owner), evaluator.number(found.input("Strength"), owner)]
     if any(value.is_textured for value in values):

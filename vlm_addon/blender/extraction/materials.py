@@ -88,7 +88,7 @@ class MaterialTable:
         base_color, base_color_texture = self._color(surface.base_color)
         emission, emission_texture = self._color(surface.emission)
         if surface.emission.attribute is not None:
-            self._report(owner, "emission from a colour attribute is not simulated", "read as white")
+            self._report(owner, "emission from a color attribute is not simulated", "read as white")
         for field_name in ("ior", "specular_ior_level"):
             if getattr(surface, field_name).is_textured:
                 self._report(owner, f"a texture in {field_name} is not simulated", "its mean is used")

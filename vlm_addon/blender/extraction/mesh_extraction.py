@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.counting import counted
 from ...core.errors import InvalidInput
 from ...core.scene import Float32, Float64, Int32, Mesh
 from ..names import TAG_PROPERTY
@@ -79,7 +80,7 @@ class MeshExtractor:
         subject = f"object {blender_object.name!r}"
         carries = blender_object.is_instancer or len(blender_object.particle_systems)
         if len(local.positions) and not carries and not instance.is_instance:
-            problem = f"its mesh has {len(local.positions)} vertices but no faces"
+            problem = f"its mesh has {counted(len(local.positions), 'vertex')} but no faces"
             raise InvalidInput(subject, problem, "add faces, delete it or disable it in renders")
         if not carries:
             self._report(subject, "it has no surface", "it is left out")
@@ -172,7 +173,7 @@ class MeshExtractor:
             chosen = slots == slot
             colors = local.corner_colors.get(use.color_attribute or next(iter(local.corner_colors), ""))
             if colors is None:
-                self._report(f"object {name!r}", f"it has no colour attribute {use.color_attribute!r}", "it is black")
+                self._report(f"object {name!r}", f"it has no color attribute {use.color_attribute!r}", "it is black")
                 result[chosen] = 0.0
                 continue
             result[chosen] = into_rec709(colors[chosen], self._to_rec709)

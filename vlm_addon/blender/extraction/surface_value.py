@@ -116,7 +116,7 @@ def combine(
             attributes.append(value.attribute)
     passes = multiplies and len(attributes) == 1
     if attributes and not passes:
-        report(f"colour attribute {attributes[0]!r} goes through a node", "read as white there")
+        report(f"color attribute {attributes[0]!r} goes through a node", "read as white there")
     return SurfaceValue(
         data=np.asarray(function(*arrays), np.float32),
         key=(name, *(value.key for value in colors)),

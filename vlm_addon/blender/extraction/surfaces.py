@@ -23,7 +23,7 @@ MATT = ("SUBSURFACE_SCATTERING", "BSDF_TRANSLUCENT", "BSDF_SHEEN", "BSDF_VELVET"
 """Shader nodes that become a Diffuse surface."""
 NEUTRAL_INPUTS = {
     "Transmission Weight": (0.0, "transmission is not simulated", "the surface is opaque"),
-    "Subsurface Weight": (0.0, "subsurface scattering is approximated", "the base colour reflects diffusely"),
+    "Subsurface Weight": (0.0, "subsurface scattering is approximated", "the base color reflects diffusely"),
     "Coat Weight": (0.0, "coat is not simulated", "it is left out"),
     "Sheen Weight": (0.0, "sheen is not simulated", "it is left out"),
     "Anisotropic": (0.0, "anisotropy is not simulated", "the highlight is round"),
@@ -85,7 +85,7 @@ class SurfaceReader:
         if kind in MATT:
             self._report(label, f"{endpoint.node.bl_label} is approximated", "reflects diffusely")
             return replace(diffuse_surface(BLACK), base_color=self._color(endpoint, owner))
-        self._report(label, f"{endpoint.node.bl_label} is not simulated", "reflects diffusely with a default grey")
+        self._report(label, f"{endpoint.node.bl_label} is not simulated", "reflects diffusely with a default gray")
         return diffuse_surface(DEFAULT_COLOR)
 
     def _color(self, endpoint: Endpoint, owner: str, name: str = "Color") -> SurfaceValue:
@@ -159,7 +159,7 @@ class SurfaceReader:
     def _transparent(self, endpoint: Endpoint, owner: str) -> Surface:
         color = self._color(endpoint, owner)
         if color.is_textured or not np.allclose(color.mean[:3], 1.0):
-            self._report(node_label(owner, endpoint.node), "coloured transparency is not simulated", "it is clear")
+            self._report(node_label(owner, endpoint.node), "colored transparency is not simulated", "it is clear")
         return replace(diffuse_surface(BLACK), alpha=constant_number(0.0), transparent=True)
 
     def _mix(self, endpoint: Endpoint, owner: str) -> Surface:

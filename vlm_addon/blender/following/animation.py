@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...core.counting import counted
 from ...core.errors import VlmError
 from ...core.scene import Finding
 from ..extraction.dynamics import is_dynamic
@@ -98,7 +99,7 @@ def _selection_problem(context: Any) -> str | None:
 
 def _report(entry: Following) -> tuple[str, str]:
     how = f"{entry.light_mesh} follows {entry.source} by its {entry.way.lower()}"
-    distance = f"{entry.vertices} vertices, {MILLIMETRES * entry.distance:.2g} mm from it on average"
+    distance = f"{counted(entry.vertices, 'vertex')}, {MILLIMETRES * entry.distance:.2g} mm from it on average"
     if not entry.note:
         return "INFO", f"{how}: {distance}"
     return "WARNING", f"{how}: {distance}; {entry.note}"

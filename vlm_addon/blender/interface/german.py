@@ -281,10 +281,10 @@ PROPERTIES = {
 """Names of settings of the scene, the views and operators, by the English ones."""
 
 SENTENCES = {
-    "Click corners on a surface, or drag around an area: a virtual light behind it, in its colour": (
+    "Click corners on a surface, or drag around an area: a virtual light behind it, in its color": (
         "Ecken auf einer Fläche klicken oder einen Bereich umfahren: ein virtuelles Licht dahinter, in ihrer Farbe"
     ),
-    "Drag a rectangle on a surface: virtual lights behind it, in its colour": (
+    "Drag a rectangle on a surface: virtual lights behind it, in its color": (
         "Ein Rechteck auf eine Fläche ziehen: virtuelle Lichter dahinter, in ihrer Farbe"
     ),
     "Drag an edge of a virtual light along a surface: a strip of lights follows": (

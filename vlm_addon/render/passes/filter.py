@@ -60,7 +60,7 @@ class FilterSettings:
         "picture widths",
         0.0,
         1e6,
-        "Distance from a pixel's tangent plane up to which neighbours count for it, of what the picture shows across "
+        "Distance from a pixel's tangent plane up to which neighbors count for it, of what the picture shows across "
         "at its depth",
         source="004, 4.12: geometric threshold",
         only_with=WITH_FILTER,
@@ -70,7 +70,7 @@ class FilterSettings:
         "cosine",
         -1.0,
         1.0,
-        "Of the angle between normals, from which on neighbours count",
+        "Of the angle between normals, from which on neighbors count",
         source="004, 4.12: geometric threshold",
         only_with=WITH_FILTER,
     )

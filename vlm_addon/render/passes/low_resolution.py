@@ -87,7 +87,7 @@ class LowResolutionSettings:
         "picture widths",
         0.0,
         1e6,
-        "Distance to the neighbours from which on a pixel is gathered on its own, of what the picture shows across at "
+        "Distance to the neighbors from which on a pixel is gathered on its own, of what the picture shows across at "
         "its depth; 0: all are",
         source="001, 3.5: discontinuity threshold",
     )
@@ -96,7 +96,7 @@ class LowResolutionSettings:
         "share",
         0.0,
         2.0,
-        "Difference between the neighbours' results, of the largest of them, above which a pixel is gathered on its "
+        "Difference between the neighbors' results, of the largest of them, above which a pixel is gathered on its "
         "own, as beside a light; 2: none is for that",
         source=OWN,
     )

@@ -69,8 +69,8 @@ class AccumulationSettings:
         "standard deviations",
         0.0,
         1e6,
-        "While something changes, how far from the mean of the neighbouring pixels earlier pictures may be: few leave "
-        "no trails, many less noise; 0 does not look at neighbours",
+        "While something changes, how far from the mean of the neighboring pixels earlier pictures may be: few leave "
+        "no trails, many less noise; 0 does not look at neighbors",
         source=OWN,
     )
     cut_share: float = setting(

@@ -58,7 +58,7 @@ class Settings:
     """How many lights, where their light is computed and how it is shadowed."""
 
     angle: float = setting(
-        5.0, "degrees", 2.0, 90.0, "Between neighbouring rays of lights around a lamp", source="000, 3.3"
+        5.0, "degrees", 2.0, 90.0, "Between neighboring rays of lights around a lamp", source="000, 3.3"
     )
     shells: int = setting(
         5,
@@ -136,7 +136,7 @@ class LightWave(Technique):
 
     name = "lightwave"
     label = "LightWave"
-    description = "Bounced light faked by lights on hemispheres around each lamp; no colour bleeds, nothing is physical"
+    description = "Bounced light faked by lights on hemispheres around each lamp; no color bleeds, nothing is physical"
     settings = Settings
 
     @classmethod
