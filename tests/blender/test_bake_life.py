@@ -258,6 +258,29 @@ def test_settings_of_the_grid_outdate_it(room):
     assert changes() == ("light grid: the scene uses none any more",)
 
 
+@pytest.mark.parametrize("change", ["links", "settings", "hidden", "excluded"])
+def test_what_blender_tells_no_change_of_is_noticed(room, change):
+    bake()
+    changes()
+    assert state() == bake_state.CURRENT
+    if change == "links":
+        bpy.data.objects["VLM Floor"]["vlm_links"] = [1, 2]
+    elif change == "settings":
+        room.vlm.vlm_settings.tolerance = 0.01
+    elif change == "hidden":
+        bpy.data.objects["Box"].hide_render = True
+    else:
+        apart = bpy.data.collections.new("Apart")
+        room.collection.children.link(apart)
+        apart.objects.link(bpy.data.objects["Box"])
+        room.collection.objects.unlink(bpy.data.objects["Box"])
+        bpy.context.view_layer.update()
+        changes()
+        bpy.context.view_layer.layer_collection.children["Apart"].exclude = True
+        bpy.context.view_layer.update()
+    assert state() == bake_state.UNKNOWN
+
+
 def test_what_is_animated_is_up_to_date_in_every_frame(room):
     box = bpy.data.objects["Box"]
     for frame, x in ((1, 0.0), (11, 2.0)):

@@ -145,3 +145,9 @@ def test_objects_added_to_those_that_lights_were_made_of_do_not_change_where_the
     add_sources(lights, ["Wall"], scene)
     assert list(lights["vlm_source_places"])[3::12] == [0.0, 0.0]
     assert sources(lights, scene) == [other, bpy.data.objects["Wall"]]
+
+
+def test_a_name_of_two_lines_is_one_source(make_lights, make_cube, scene):
+    cube = make_cube("two\nlines")
+    wall = make_cube("Wall")
+    assert sources(make_lights("Lights", cube.name, "Wall"), scene) == [cube, wall]

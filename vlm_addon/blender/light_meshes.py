@@ -62,7 +62,8 @@ def set_sources(thing: Any, names: Sequence[str], scene: Any) -> None:
     counts = _id_counts()
     ids = [NO_ID if source is None else ensure_id(source, counts) for source in found]
     ensure_id(thing, counts)
-    thing[SOURCES_PROPERTY], thing[SOURCE_IDS_PROPERTY] = "\n".join(names), ids
+    lines = [name.replace("\n", " ") for name in names]
+    thing[SOURCES_PROPERTY], thing[SOURCE_IDS_PROPERTY] = "\n".join(lines), ids
     _store_places(thing, found)
 
 

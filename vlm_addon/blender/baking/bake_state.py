@@ -15,21 +15,28 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
+from ...core.array_codec import content_hash
 from ...core.bake_key import BakeKey, grid_changes, grid_key, surface_changes, surface_hashes
 from ...core.errors import InvalidInput
 from ..extraction.light_mesh_io import extract
 from ..interface.availability import GEOMETRY_TYPES
+from ..interface.properties import technique_settings
 from ..interface.translation import told
-from ..light_grid_options import scene_grid_settings
+from ..light_grid_options import TECHNIQUE, scene_grid_settings
 from ..light_meshes import light_meshes
-from ..stored_values import text, wrong_value
+from ..names import DYNAMIC_PROPERTY, LINKS_PROPERTY
+from ..stored_values import plain, text, wrong_value
 from . import bake_store
 
 WINDOW_PROPERTY = "vlm_bake"
 MADE_FROM_PROPERTY = "vlm_made_from"
 """On light mesh objects: hash of each surface that it was made from, as JSON."""
+
+STAMPED = (LINKS_PROPERTY, DYNAMIC_PROPERTY)
+"""Custom properties of light meshes that a baked grid depends on."""
 
 NONE, CURRENT, UNKNOWN, OLD = "NONE", "CURRENT", "UNKNOWN", "OLD"
 ICONS = {NONE: "RADIOBUT_OFF", CURRENT: "CHECKMARK", UNKNOWN: "QUESTION", OLD: "ERROR"}
@@ -55,6 +62,7 @@ class VLM_PG_bake(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming of c
     looked: bpy.props.BoolProperty(name="Compared")  # type: ignore[valid-type]
     touched: bpy.props.BoolProperty(name="Changed since")  # type: ignore[valid-type]
     changes: bpy.props.StringProperty(name="What is out of date")  # type: ignore[valid-type]
+    stamp: bpy.props.StringProperty(name="What Blender tells no changes of")  # type: ignore[valid-type]
     folder: bpy.props.StringProperty(name="Folder of baked data before a save")  # type: ignore[valid-type]
 
 
@@ -68,7 +76,7 @@ def badge(context: Any) -> Badge:
     if not known.looked or known.scene != scene.name:
         subject = "Light grid baked" if has_grid else "Light mesh made"
         return Badge(UNKNOWN, f"{subject} earlier: compare to see whether it is up to date")
-    if known.touched:
+    if known.touched or known.stamp != _stamp(context):
         return Badge(UNKNOWN, "The scene was changed: the bake may be out of date")
     if known.changes:
         return Badge(OLD, f"{told('Out of date:')} {known.changes}")
@@ -129,12 +137,23 @@ def remember(context: Any, changes: list[str] | tuple[str, ...]) -> None:
     known = _state(context)
     known.scene, known.looked, known.touched = context.scene.name, True, False
     known.changes = "; ".join(changes)
+    known.stamp = _stamp(context)
 
 
 def forget(context: Any) -> None:
     """Whether baked data is up to date is not known."""
     known = _state(context)
     known.looked, known.touched, known.changes = False, False, ""
+
+
+def _stamp(context: Any) -> str:
+    """What a bake depends on and Blender tells no changes of: custom properties, settings, what is hidden."""
+    things = context.view_layer.objects
+    hidden = np.zeros(len(things), bool)
+    things.foreach_get("hide_render", hidden)
+    stored = [(thing.name, [str(plain(thing.get(key))) for key in STAMPED]) for thing in light_meshes(context.scene)]
+    settings = technique_settings(context.scene, TECHNIQUE)
+    return content_hash([repr(settings), repr(stored), hidden])
 
 
 def _state(context: Any) -> Any:
