@@ -21,7 +21,10 @@ from PIL import Image
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 SCREEN = (1600, 900)
-STEPS = (HERE / "window_steps.py", HERE / "sidebar_steps.py", ROOT / "tests" / "blender" / "survival_state.py")
+STEPS = (
+    *(HERE / name for name in ("window_steps.py", "sidebar_steps.py", "situations.py")),
+    ROOT / "tests" / "blender" / "survival_state.py",
+)
 """What drivers import."""
 
 

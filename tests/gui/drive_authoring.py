@@ -1,352 +1,236 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sits inside Blender's window and presses every button of the sidebar with the mouse, in each situation.
+"""Presses every button of the sidebar with the mouse, each in the situation that it is for, and undoes and redoes it.
 
-Run by test_authoring.py: `blender … --enable-event-simulate --python drive_authoring.py -- ZIP FOLDER`. A button is
-found by moving the mouse over the sidebar and asking Blender for the Python command of what is under it. Writes
-FOLDER/story.json: for each situation and button what came of it, and a screenshot after each.
+Played by test_authoring_window.py; see window_steps.py. STORY: for each operator what came of it, and a screenshot.
 """
 
-import hashlib
-import json
-import re
-import subprocess
-import sys
+import os
 import time
-import traceback
-from pathlib import Path
 
-import bmesh
 import bpy
-import numpy as np
+from sidebar_steps import (
+    STEP_PIXELS,
+    adjust_last,
+    copied_under_mouse,
+    ended_operators,
+    ended_since,
+    press_button,
+    press_menu_beside,
+    shown_buttons,
+    watch_popup,
+    whole_sidebar,
+)
+from situations import SITUATIONS, cube, lights_selected, scene
+from survival_state import content, difference
+from window_steps import (
+    FOLDER,
+    SECONDS_FOR_REDRAW,
+    STORY,
+    at,
+    click,
+    comes_true,
+    install,
+    look,
+    middle_of_view,
+    nothing_runs,
+    picture_is_ready,
+    press,
+    redraw,
+    render_without_window,
+    run,
+    slow_click,
+    type_text,
+    until,
+    view,
+    write_story,
+)
 
-ZIP, FOLDER = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-SECONDS_FOR_REDRAW = 0.4
-SECONDS_FOR_A_MOVE = 0.05
-LONGEST_WAIT_SECONDS = 60.0
-STEP_PIXELS = 18
-LEFT, RIGHT = 0.3, 0.8
-"""Shares of the sidebar's width: buttons that share a row are asked for one by one."""
-PAGES = 4
-CLICKS = 2
-"""The first click on a sidebar that has just been scrolled may go to its scrolling."""
-SCROLLS_PER_PAGE = 12
-PLACE = {"page": 0}
-"""How far the sidebar is scrolled."""
-COMMAND = re.compile(r"bpy\.ops\.vlm\.(\w+)\((.*)\)")
-BUDGET = 60
-LEFT_OUT = {"light_scene", "open_documentation", "paint_detail", "show_licences"}
-"""Buttons that render a picture (test_window.py presses them), open a browser, a menu or a list that stays open."""
-STORY = {"version": bpy.app.version_string, "pressed": {}, "buttons": {}, "left out": sorted(LEFT_OUT)}
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def region(kind):
-    """(area, region) of the largest 3D view."""
-    areas = [area for area in window().screen.areas if area.type == "VIEW_3D"]
-    area = max(areas, key=lambda each: each.width * each.height)
-    return area, next(each for each in area.regions if each.type == kind)
-
-
-def over(kind):
-    area, found = region(kind)
-    return bpy.context.temp_override(window=window(), area=area, region=found)
-
-
-def event(kind, value, place, **more):
-    window().event_simulate(type=kind, value=value, x=place[0], y=place[1], **more)
-
-
-def click(place):
-    event("MOUSEMOVE", "NOTHING", place)
-    yield SECONDS_FOR_A_MOVE
-    event("LEFTMOUSE", "PRESS", place)
-    event("LEFTMOUSE", "RELEASE", place)
-    yield SECONDS_FOR_A_MOVE
-
-
-def middle_of_view(right=0.0, up=0.0):
-    _, found = region("WINDOW")
-    return (
-        found.x + int(found.width * (0.4 + right)),
-        found.y + int(found.height * (0.5 + up)),
-    )
-
-
-def press(key, **modifiers):
-    place = middle_of_view()
-    event("MOUSEMOVE", "NOTHING", place)
-    event(key, "PRESS", place, **modifiers)
-    event(key, "RELEASE", place, **modifiers)
+PIE_PIXELS = 120
+FIELD_PIXELS = 20
+"""By which the mouse goes to the left, into the middle of the field."""
+PRESETS_ICON = (172, -11)
+PRESETS_HEIGHT = 200
+SECONDS_TO_UNDO = 10.0
+LAST_USED = {
+    "multiply_color": {"factor": 3.0},
+    "shift_hue": {"turn": 2.0},
+    "gradient_color": {"last_color": (0.0, 0.5, 1.0)},
+}
+"""What the artist gave these when they were used last: with their defaults they would change nothing here."""
+ADJUSTED = {"set_strength": "5"}
+"""What is put into the first number of Adjust Last Operation."""
+NOT_UNDONE = {
+    "open_documentation",
+    "copy_diagnostics",
+    "show_licences",
+    "bake_grid",
+    "check_bake",
+    "clear_bake",
+    "show_light_grid",
+}
+"""What changes nothing of the file."""
 
 
-def redraw():
-    for area in window().screen.areas:
-        area.tag_redraw()
+LISTED = {"objects selected", "lights selected", "lights edited", "both selected"}
+"""Situations in which all buttons of the sidebar are listed."""
 
 
-def look(name):
-    subprocess.run(["import", "-window", "root", str(FOLDER / f"{name}.png")], check=True)
-
-
-def until(condition):
-    """Yields until `condition` holds; raises after the longest wait."""
-    start = time.monotonic()
-    while not condition():
-        if time.monotonic() - start > LONGEST_WAIT_SECONDS:
-            raise TimeoutError(condition.__name__)
-        yield 0.1
-
-
-def nothing_runs():
-    return not any(operator.bl_idname.startswith("VLM_OT") for operator in window().modal_operators)
-
-
-def light_meshes():
-    return [thing for thing in bpy.context.scene.objects if "vlm_schema" in thing]
-
-
-def content():
-    """Digest of all objects and of the face attributes and corners of all meshes."""
-    parts = []
-    for thing in sorted(bpy.data.objects, key=lambda each: each.name):
-        values = {key: str(thing[key]) for key in thing.keys() if key.startswith("vlm_")}  # noqa: SIM118
-        parts.append(repr((thing.name, sorted(values), thing.parent and thing.parent.name, len(thing.modifiers))))
-        if thing.type == "MESH":
-            parts.append(faces(thing))
-    return hashlib.sha1("\n".join(parts).encode()).hexdigest()
-
-
-def faces(thing):
-    copy = thing.data
-    if thing.mode == "EDIT":
-        copy = bpy.data.meshes.new("copy")
-        edited = bmesh.from_edit_mesh(thing.data).copy()
-        edited.to_mesh(copy)
-        edited.free()
-    found = [[tuple(vertex.co) for vertex in copy.vertices]]
-    for attribute in copy.attributes:
-        if attribute.name.startswith("vlm_"):
-            color = attribute.data_type == "FLOAT_COLOR"
-            values = np.empty(len(attribute.data) * (4 if color else 1), np.float32 if color else np.float64)
-            attribute.data.foreach_get("color" if color else "value", values)
-            found.append((attribute.name, values.tobytes()))
-    if copy is not thing.data:
-        bpy.data.meshes.remove(copy)
-    return hashlib.sha1(repr(found).encode()).hexdigest()
-
-
-def scroll(kind, count):
-    """Turn the wheel over the sidebar."""
-    _, sidebar = region("UI")
-    for _ in range(count):
-        event(kind, "PRESS", (sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height // 2))
-        yield SECONDS_FOR_A_MOVE
-    if count:
-        yield SECONDS_FOR_REDRAW
-
-
-def to_page(page):
-    """Scroll the sidebar to a page; to its top in any case where that is asked for."""
-    if page < PLACE["page"] or page == 0:
-        yield from scroll("WHEELUPMOUSE", PLACE["page"] * SCROLLS_PER_PAGE)
-        PLACE["page"] = 0
-    yield from scroll("WHEELDOWNMOUSE", (page - PLACE["page"]) * SCROLLS_PER_PAGE)
-    PLACE["page"] = page
-
-
-def top_of_sidebar():
-    with over("UI"):
-        return round(bpy.context.region.view2d.region_to_view(0.0, 0.0)[1])
-
-
-def find_buttons():
-    """{operator: (page, place on the screen)} of each operator's first button in the sidebar."""
-    found, seen = {}, set()
-    yield from to_page(0)
-    for page in range(PAGES):
-        if top_of_sidebar() in seen:
-            break
-        seen.add(top_of_sidebar())
-        yield from scan(page, found)
-        yield from to_page(page + 1)
-    return found
-
-
-def scan(page, found):
-    """Ask what is under the mouse, row by row of the sidebar."""
-    _, sidebar = region("UI")
-    for y in range(sidebar.y + sidebar.height - 12, sidebar.y + 8, -STEP_PIXELS):
-        for column in (LEFT, RIGHT):
-            place = (sidebar.x + int(sidebar.width * column), y)
-            event("MOUSEMOVE", "NOTHING", place)
-            yield 0.0
-            command = COMMAND.search(command_under_mouse())
-            if command and command[1] not in found:
-                found[command[1]] = (page, place)
-            if not command:
-                break
-
-
-def command_under_mouse():
-    bpy.context.window_manager.clipboard = ""
-    with over("UI"):
-        if bpy.ops.ui.copy_python_command_button.poll():
-            bpy.ops.ui.copy_python_command_button()
-    return bpy.context.window_manager.clipboard
-
-
-def press_button(name, page, place, situation):
-    """Click one button, follow it through where it waits for a click on a surface, and take it back by Ctrl+Z."""
-    start = time.monotonic()
-    yield from to_page(page)
-    before, operators = content(), len(bpy.context.window_manager.operators)
-    for _ in range(CLICKS):
-        yield from click(place)
-        yield SECONDS_FOR_REDRAW
-        if not nothing_runs() or content() != before or len(bpy.context.window_manager.operators) > operators:
-            break
-    waited = not nothing_runs()
-    for _ in range(20):
-        if nothing_runs():
-            break
-        yield SECONDS_FOR_REDRAW
-    if not nothing_runs():
-        yield from click(middle_of_view())
-        yield SECONDS_FOR_REDRAW
-    ended_by_esc = not nothing_runs()
-    if ended_by_esc:
-        press("ESC")
-        yield SECONDS_FOR_REDRAW
-    yield from until(nothing_runs)
+def pick_from_the_cube(button):
+    yield from until(lambda: not nothing_runs())
+    click(at(cube().matrix_world.translation))
     yield SECONDS_FOR_REDRAW
-    look(f"{situation}_{name}".replace(" ", "_"))
-    done = [each.bl_idname for each in bpy.context.window_manager.operators][operators:]
-    told = {"done": done, "modal": waited, "Esc": ended_by_esc, "changed": content() != before}
-    if told["changed"]:
-        press("Z", ctrl=True)
-        yield SECONDS_FOR_REDRAW
-        told["undone"] = content() == before
-    told["seconds"] = time.monotonic() - start
-    STORY["pressed"].setdefault(name, {})[situation] = told
+
+
+def first_of_the_menu(button):
+    yield from look("menu")
+    press("DOWN_ARROW", button)
+    press("RET", button)
+    yield SECONDS_FOR_REDRAW
+
+
+def popup_is_read(button):
+    yield from look("popup")
+    press("ESC", button)
+    yield SECONDS_FOR_REDRAW
+
+
+WAITING = {"pick_color": pick_from_the_cube, "paint_detail": first_of_the_menu, "show_licences": popup_is_read}
+"""What the artist does while an operator waits for it."""
+
+
+MENUS = {"paint_detail": ("lock_lights", 20)}
+"""Operators that have a menu in place of a button: what it is above, and by how many pixels."""
+
+
+def press_in(situation, arrange, name):
+    """Press one button in a situation, look at the window, and undo and redo it with keys."""
+    arrange()
+    bpy.ops.ed.undo_push(message=situation)
+    for key, value in LAST_USED.get(name, {}).items():
+        setattr(bpy.context.window_manager.operator_properties_last(f"vlm.{name}"), key, value)
+    before, start = content(), time.monotonic()
+    if name in MENUS:
+        told = yield from press_menu_beside(*MENUS[name], WAITING[name])
+    else:
+        told = yield from press_button(name, follow=WAITING.get(name))
+    if name == "light_scene" and told["did"]:
+        yield from until(picture_is_ready)
+    if name in ADJUSTED:
+        told["adjusted"] = yield from adjust_last("number", ADJUSTED[name])
+    yield from look(f"{situation}_{name}".replace(" ", "_"))
+    after = content()
+    told["changed"] = bool(difference(before, after))
+    if name not in NOT_UNDONE:
+        for step, key in (("undone", {}), ("redone", {"shift": True}), ("undone again", {})):
+            wanted = after if step == "redone" else before
+            press("Z", ctrl=True, **key)
+            told[step] = yield from comes_true(lambda wanted=wanted: content() == wanted, SECONDS_TO_UNDO)
+            if not told[step]:
+                told[f"not {step}"] = difference(content(), wanted)
+    bpy.context.window_manager.vlm_overlay.show = False  # the button of the light grid switches it on; it takes time
+    told["seconds"] = round(time.monotonic() - start, 1)
+    STORY["pressed"][f"{situation}: {name}"] = told
     write_story()
 
 
-def press_all(situation, arrange):
-    """Find the buttons that this situation shows, and press each of them once over the whole story."""
-    arrange()
-    bpy.ops.ed.undo_push(message=situation)
-    redraw()
-    yield SECONDS_FOR_REDRAW
-    start = time.monotonic()
-    found = yield from find_buttons()
-    STORY.setdefault("seconds to find", {})[situation] = time.monotonic() - start
-    STORY["buttons"][situation] = sorted(found)
-    yield from to_page(0)
-    look(situation.replace(" ", "_"))
-    for name, (page, place) in found.items():
-        if name in LEFT_OUT or any(
-            f"VLM_OT_{name}" in told["done"] for told in STORY["pressed"].get(name, {}).values()
-        ):
-            continue
-        with over("UI"):
-            enabled = getattr(bpy.ops.vlm, name).poll()
-        if not enabled:
-            continue
-        yield from press_button(name, page, place, situation)
+def situation_by_situation():
+    for situation, arrange, names in SITUATIONS:
         arrange()
-        yield SECONDS_FOR_REDRAW
+        yield from redraw()
+        if situation in LISTED:
+            STORY["buttons"][situation] = yield from shown_buttons()
+        yield from look(situation.replace(" ", "_"))
+        for name in names:
+            yield from press_in(situation, arrange, name)
 
 
-def open_panels():
-    """Register the panels of the sidebar anew so that none of them begins closed."""
-    panels = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__name__.startswith("VLM_PT_")]
-    panels = [cls for cls in panels if getattr(cls, "bl_space_type", "") == "VIEW_3D" and cls.is_registered]
-    for cls in reversed(panels):
-        bpy.utils.unregister_class(cls)
-    for cls in panels:
-        cls.bl_options = set(getattr(cls, "bl_options", ())) - {"DEFAULT_CLOSED"}
-        bpy.utils.register_class(cls)
+def other_ways():
+    """Operators started from the pie menu and from Blender's search."""
+    lights_selected()
+    bpy.ops.ed.undo_push(message="other ways")
+    for name, steps in (("pie", upper_of_the_pie), ("search", found_by_name)):
+        before = ended_operators()
+        yield from steps()
+        yield from comes_true(lambda before=before: ended_since(before), SECONDS_TO_UNDO)
+        STORY[name] = ended_since(before)
 
 
-def choose(*things):
-    if bpy.context.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
-    for each in bpy.context.view_layer.objects:
-        each.select_set(each in things)
-    bpy.context.view_layer.objects.active = things[0]
+def upper_of_the_pie():
+    press("V", shift=True, alt=True)
+    yield from look("pie")
+    x, y = middle_of_view()
+    yield from slow_click((x, y + PIE_PIXELS))
 
 
-def cube():
-    choose(bpy.data.objects["Cube"])
+def found_by_name():
+    press("F3")
+    yield SECONDS_FOR_REDRAW
+    yield from type_text("gradient color")
+    yield from look("search")
+    press("RET")
 
 
-def lights_selected():
-    choose(light_meshes()[0])
+def add_preset():
+    """Through the icon in the title of Create: the field with the name of the preset, and the plus sign beside it."""
+    _, sidebar = view("UI")
+    x, top = sidebar.x + PRESETS_ICON[0], sidebar.y + sidebar.height + PRESETS_ICON[1]
+    before = ended_operators()
+    yield from slow_click((x, top))
+    yield from look("presets")
+    for y in range(top - STEP_PIXELS, top - PRESETS_HEIGHT, -STEP_PIXELS):
+        if (yield from copied_under_mouse((x, y))) == "New Preset":
+            break
+    for right in range(0, PRESETS_HEIGHT, STEP_PIXELS // 2):
+        if "add_preset" in (yield from copied_under_mouse((x + right, y))):
+            yield from slow_click((x + right, y))
+            break
+    yield from comes_true(lambda: ended_since(before), SECONDS_TO_UNDO)
+    STORY["preset"] = ended_since(before)
+    press("ESC")
+    yield from redraw()
 
 
-def lights_edited():
-    choose(light_meshes()[0])
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
+def name_in_dialog(button):
+    """Where no object is selected, leaving out asks for one, in a field that comes under the mouse: by name."""
+    yield from look("dialog")
+    field = button[0] - FIELD_PIXELS, button[1]
+    yield from slow_click(field)
+    yield from type_text("Cube", field)
+    yield from look("dialog_filled")
+    press("RET", field)
+    yield SECONDS_FOR_REDRAW
+    press("RET", field)
+    yield from look("dialog_done")
 
 
-def both():
-    choose(light_meshes()[0], bpy.data.objects["Cube"])
+def left_out_by_name():
+    lights_selected()
+    bpy.ops.ed.undo_push(message="lights alone")
+    STORY["by name"] = yield from press_button("link_receiver", follow=name_in_dialog)
+
+
+def notes_what_is_opened():
+    """A program of the name that opens documents, which writes down what it was asked to open."""
+    program = FOLDER / "xdg-open"
+    program.write_text(f'#!/bin/sh\necho "$1" >> "{FOLDER}/opened.txt"\n')
+    program.chmod(0o755)
+    os.environ["PATH"] = f"{FOLDER}:{os.environ['PATH']}"
 
 
 def story():
-    bpy.ops.extensions.package_install_files(filepath=str(ZIP), repo="user_default", enable_on_install=True)
-    open_panels()
-    area, _ = region("WINDOW")
-    area.spaces.active.show_region_ui = True
-    # A sidebar of its own beside a view of few lines: software renderers draw both at each move of the mouse.
-    bpy.context.preferences.system.use_region_overlap = False
-    area.spaces.active.shading.type = "WIREFRAME"
-    area.spaces.active.overlay.show_floor = False
-    yield SECONDS_FOR_REDRAW
-    region("UI")[1].active_panel_category = "VLM"
-    bpy.context.scene.vlm.target_triangles = BUDGET
-    bpy.data.objects["Cube"].keyframe_insert("location", frame=1)
-    bpy.data.objects["Cube"].keyframe_insert("location", frame=2)
-    yield from press_all("object selected", cube)
-    cube()
-    with over("WINDOW"):
-        bpy.ops.vlm.create_from_selection("EXEC_DEFAULT", True, target_triangles=BUDGET)
-    light_meshes()[0].data.attributes["vlm_color"].data[0].color = (3.0, 3.0, 3.0, 1.0)
-    with over("WINDOW"):
-        bpy.ops.vlm.check("EXEC_DEFAULT", True)
-    for situation, arrange in (
-        ("light mesh selected", lights_selected),
-        ("light mesh edited", lights_edited),
-        ("both selected", both),
-    ):
-        yield from press_all(situation, arrange)
-    STORY["finished"] = True
+    install()
+    yield from whole_sidebar()
+    scene()
+    notes_what_is_opened()
+    watch_popup("show_licences")
+    bpy.context.window_manager.vlm_overlay.grid = True  # its panel shows the button with it
+    render_without_window()
+    STORY.update({"pressed": {}, "buttons": {}, "not undone": sorted(NOT_UNDONE)})
+    yield from situation_by_situation()
+    yield from other_ways()
+    yield from left_out_by_name()
+    yield from add_preset()
+    STORY["opened"] = (FOLDER / "opened.txt").read_text().split()
 
 
-def write_story():
-    (FOLDER / "story.json").write_text(json.dumps(STORY, indent=1))
-
-
-def run(steps):
-    """A timer callback that goes through `steps`, writes the story and quits."""
-
-    def advance():
-        try:
-            return next(steps)
-        except StopIteration:
-            pass
-        except BaseException:  # noqa: BLE001 (Blender would go on and never quit)
-            STORY["error"] = traceback.format_exc()
-        write_story()
-        bpy.ops.wm.quit_blender()
-        return None
-
-    return advance
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.app.timers.register(run(story()), first_interval=2.0)
+run(story())

@@ -1,68 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sits inside Blender's window and disturbs long work: edits, undoes, deletes, saves, loads, disables while it runs.
+"""Disturbs long work: edits, undoes, deletes, saves, loads, disables while it runs.
 
-Run by test_bake_window.py: `blender … --enable-event-simulate --python drive_bake.py -- ZIP FOLDER`. Writes
-FOLDER/story.json and screenshots.
+Played by test_bake_window.py; see window_steps.py.
 """
 
-import json
-import subprocess
-import sys
-import time
-import traceback
-from pathlib import Path
-
 import bpy
+from window_steps import (
+    FOLDER,
+    MODULE,
+    SECONDS_FOR_REDRAW,
+    STORY,
+    in_view,
+    install,
+    look,
+    nothing_runs,
+    press,
+    redraw,
+    run,
+    show_sidebar,
+    until,
+    window,
+    write_story,
+)
 
-ZIP, FOLDER = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-MODULE = "bl_ext.user_default.virtual_light_mesh"
 GRID = 200
 LIGHTS = 100
-SECONDS_FOR_REDRAW = 0.7
-LONGEST_WAIT_SECONDS = 120.0
-STORY = {"seen": []}
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def in_view():
-    """Context of the largest 3D view, for operators."""
-    areas = [area for area in window().screen.areas if area.type == "VIEW_3D"]
-    area = max(areas, key=lambda each: each.width * each.height)
-    region = next(each for each in area.regions if each.type == "WINDOW")
-    return bpy.context.temp_override(window=window(), area=area, region=region)
-
-
-def press(key, **modifiers):
-    """One key with the mouse over the 3D view."""
-    with in_view():
-        area = bpy.context.area
-        x, y = area.x + area.width // 3, area.y + area.height // 2
-    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
-    window().event_simulate(type=key, value="PRESS", x=x, y=y, **modifiers)
-    window().event_simulate(type=key, value="RELEASE", x=x, y=y, **modifiers)
-
-
-def look(name):
-    """Screenshot into FOLDER."""
-    for area in window().screen.areas:
-        area.tag_redraw()
-    subprocess.run(["import", "-window", "root", str(FOLDER / f"{name}.png")], check=True)
-    STORY["seen"].append(name)
-
-
-def running():
-    return any(operator.bl_idname.startswith("VLM_OT") for operator in window().modal_operators)
-
-
-def until_it_ends():
-    start = time.monotonic()
-    while running():
-        if time.monotonic() - start > LONGEST_WAIT_SECONDS:
-            raise TimeoutError("the work did not end")
-        yield 0.1
 
 
 def lights():
@@ -92,21 +54,21 @@ def begin():
     return sorted(result)
 
 
-def disturbed(name, disturb, end=until_it_ends):
+def disturbed(name, disturb, end=lambda: until(nothing_runs)):
     """One story: a large file, work on it, `disturb` in the middle of it, and what there is afterwards."""
     yield from large_file()
     told = STORY[name] = {"began": begin()}
     yield 0.3
-    told["ran"] = running()
+    told["ran"] = not nothing_runs()
     result = disturb()
     yield 0.3
-    told["ran after"] = running()
-    look(name)
+    told["ran after"] = not nothing_runs()
+    yield from look(name)
     yield from end()
     yield SECONDS_FOR_REDRAW
     told |= {"lights": lights(), "orphans": orphans(), "objects": len(window().scene.objects), "said": result}
     told["scene"] = window().scene.name
-    (FOLDER / "story.json").write_text(json.dumps(STORY, indent=1))
+    write_story()
 
 
 def delete_source():
@@ -160,22 +122,18 @@ def in_german():
     view = bpy.context.preferences.view
     view.language, view.use_translate_interface = "de_DE", True
     yield SECONDS_FOR_REDRAW
-    with in_view():
-        area = bpy.context.area
-        area.spaces.active.show_region_ui = True
-    yield SECONDS_FOR_REDRAW
-    next(region for region in area.regions if region.type == "UI").active_panel_category = "VLM"
-    yield SECONDS_FOR_REDRAW
-    look("german")
+    yield from show_sidebar()
+    yield from look("german")
     tell = bpy.app.translations.pgettext_iface
     STORY["german"] = [tell("Bake Light Grid", "Operator"), tell("Target Triangles")]
+    STORY["german of ours"] = [tell("Tags", "VLM"), tell("Light Polygon", "Operator"), tell("Nothing is baked", "VLM")]
     view.language = "en_US"
 
 
 def story():
     """The steps; each yield waits that many seconds while Blender runs on."""
-    bpy.ops.extensions.package_install_files(filepath=str(ZIP), repo="user_default", enable_on_install=True)
-    yield SECONDS_FOR_REDRAW
+    STORY["enabled"] = install()
+    yield from redraw()
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "other.blend"), copy=True)
     for name, disturb in (
@@ -196,27 +154,8 @@ def story():
     yield from in_german()
     yield from large_file()
     STORY["after all"] = {"began": begin()}
-    yield from until_it_ends()
+    yield from until(nothing_runs)
     STORY["after all"]["lights"] = lights()
-    STORY["finished"] = True
 
 
-def run(steps):
-    """A timer callback that goes through `steps`, writes the story and quits."""
-
-    def advance():
-        try:
-            return next(steps)
-        except StopIteration:
-            pass
-        except BaseException:  # noqa: BLE001 (Blender would go on and never quit)
-            STORY["error"] = traceback.format_exc()
-        (FOLDER / "story.json").write_text(json.dumps(STORY, indent=1))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    return advance
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.app.timers.register(run(story()), first_interval=2.0, persistent=True)
+run(story())

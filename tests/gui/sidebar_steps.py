@@ -45,12 +45,12 @@ def whole_sidebar():
     """Show our tab with all panels open but the effects, which have no operators, beside a view of few lines: software
     draws both at each move of the mouse."""
     panels = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__name__.startswith("VLM_PT_")]
-    panels = [cls for cls in panels if cls.__name__ != "VLM_PT_effects"]
     panels = [cls for cls in panels if getattr(cls, "bl_space_type", "") == "VIEW_3D" and cls.is_registered]
     for cls in reversed(panels):
         bpy.utils.unregister_class(cls)
     for cls in panels:
-        cls.bl_options = set(getattr(cls, "bl_options", ())) - {"DEFAULT_CLOSED"}
+        if cls.__name__ != "VLM_PT_effects":
+            cls.bl_options = set(getattr(cls, "bl_options", ())) - {"DEFAULT_CLOSED"}
         bpy.utils.register_class(cls)
     bpy.context.preferences.system.use_region_overlap = False
     bpy.context.preferences.view.ui_scale = SMALLER
@@ -214,6 +214,16 @@ def open_panel(title):
     raise TimeoutError("the panel Adjust Last Operation stays closed")
 
 
+def copied_under_mouse(place):
+    """Yields; what Blender copies of the field or button there by Ctrl+C: a value, or the Python command."""
+    bpy.context.window_manager.clipboard = ""
+    move(place)
+    yield SECONDS_FOR_AN_EVENT
+    press("C", place, ctrl=True)
+    yield SECONDS_FOR_AN_EVENT
+    return bpy.context.window_manager.clipboard
+
+
 def adjust_last(kind, text):
     """Paste a value into a field of the panel Adjust Last Operation: the first one from the top that holds a color,
     where kind is "color", or else a number. Yields; returns whether there was one.
@@ -226,12 +236,7 @@ def adjust_last(kind, text):
         panel = adjust_panel()
     x = panel.x + int(0.7 * panel.width)
     for y in range(panel.y + panel.height - STEP_PIXELS, panel.y, -STEP_PIXELS):
-        bpy.context.window_manager.clipboard = ""
-        move((x, y))
-        yield SECONDS_FOR_AN_EVENT
-        press("C", (x, y), ctrl=True)
-        yield SECONDS_FOR_AN_EVENT
-        copied = bpy.context.window_manager.clipboard
+        copied = yield from copied_under_mouse((x, y))
         if copied.startswith("[") if kind == "color" else is_number(copied):
             bpy.context.window_manager.clipboard = text
             press("V", (x, y), ctrl=True)

@@ -1,85 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension in Blender's own window: drive.py plays a new user, the tests read what it saw.
+"""The extension in Blender's own window: drive_window.py plays a new user, the tests read what it saw.
 
-Blender comes from VLM_BLENDER_CHROOT (a folder to chroot into, as root) or is `blender` on PATH; both need xvfb-run
-and ImageMagick's `import`. VLM_SCREENSHOTS names a folder that keeps the screenshots to be looked at.
+Blender is found as blender_window.py says.
 """
-
-import json
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.gui.blender_window import assert_ended_well, pixels
+
 pytestmark = pytest.mark.full
 
-ROOT = Path(__file__).resolve().parents[2]
-SCREEN = "1600x900"
-MINUTES = 5
+DRIVER = "window"
+MINUTES = 8
 
 
-@pytest.fixture(scope="module")
-def story(tmp_path_factory):
-    """What drive.py wrote, with `folder` and `output` added."""
-    chroot = os.environ.get("VLM_BLENDER_CHROOT")
-    if not chroot and not (shutil.which("blender") and shutil.which("xvfb-run") and shutil.which("import")):
-        pytest.skip("no Blender with a window: set VLM_BLENDER_CHROOT, or install blender, xvfb and imagemagick")
-    folder = tmp_path_factory.mktemp("window")
-    subprocess.run([sys.executable, ROOT / "tools" / "package.py", "--output", folder], check=True)
-    (package,) = folder.glob("*-linux_x64.zip")
-    outside = Path(tempfile.mkdtemp(prefix="vlm-window-", dir=f"{chroot}/root")) if chroot else folder
-    inside = Path("/root") / outside.name if chroot else folder
-    for path in (package, Path(__file__).with_name("drive.py")):
-        if path.parent != outside:
-            shutil.copy(path, outside)
-    try:
-        done = subprocess.run(
-            command(chroot, inside, package.name), capture_output=True, text=True, timeout=60 * MINUTES
-        )
-        if not (outside / "story.json").exists():
-            pytest.fail(f"Blender ended early:\n{done.stdout}{done.stderr}")
-        told = json.loads((outside / "story.json").read_text())
-        for path in outside.glob("*.png"):
-            shutil.copy(path, folder) if path.parent != folder else None
-    finally:
-        if chroot:
-            shutil.rmtree(outside)
-    keep = os.environ.get("VLM_SCREENSHOTS")
-    if keep:
-        shutil.copytree(folder, keep, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.zip", "*.json", "*.py"))
-    return {**told, "folder": folder, "output": done.stdout + done.stderr}
-
-
-def command(chroot, folder, package):
-    """The command line that runs drive.py in Blender on a screen of its own."""
-    size = SCREEN.split("x")
-    return [
-        *(["chroot", chroot] if chroot else []),
-        *["env", "LIBGL_ALWAYS_SOFTWARE=1", f"BLENDER_USER_RESOURCES={folder}/user", f"HOME={folder}"],
-        *["xvfb-run", "-a", "-s", f"-screen 0 {SCREEN}x24"],
-        *["blender", "--gpu-backend", "opengl", "--window-geometry", "0", "0", *size, "--factory-startup"],
-        *["--enable-event-simulate", "--python", f"{folder}/drive.py", "--", f"{folder}/{package}", str(folder)],
-    ]
-
-
-def pixels(path):
-    from PIL import Image
-
-    return np.asarray(Image.open(path).convert("RGB"), np.float64) / 255
-
-
-def test_the_story_came_to_its_end(story):
-    assert "error" not in story, story["error"]
-    assert story["finished"]
-
-
-def test_nothing_was_raised_on_the_way(story):
-    assert "Traceback" not in story["output"], story["output"]
+def test_the_story_came_to_its_end_and_nothing_was_raised_on_the_way(story):
+    assert_ended_well(story)
 
 
 def test_the_zip_installs_and_enables(story):
