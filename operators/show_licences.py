@@ -9,10 +9,10 @@ POPUP_WIDTH = 480
 
 
 class VLM_OT_show_licences(Operator):  # noqa: N801 (Blender's naming of classes)
-    """List the licences of the extension and of the software that comes with it"""
+    """List the licenses of the extension and of the software that comes with it"""
 
     bl_idname = "vlm.show_licences"
-    bl_label = "Licences"
+    bl_label = "Licenses"
     bl_options = {"REGISTER"}  # noqa: RUF012 (nothing of the file is changed)
 
     def invoke(self, context, event):

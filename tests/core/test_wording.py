@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("vlm_addon", "operators")
-BRITISH = re.compile(r"colour|\bgrey|centre\b|metres?\b|neighbour|behaviour|favour", re.IGNORECASE)
+BRITISH = re.compile(r"colour|\bgrey|centre\b|metres?\b|neighbour|behaviour|favour|licence\b|licences\b", re.IGNORECASE)
 NAME = re.compile(r"[\w.]+")
 SHADER = re.compile(r"[;{}]\n")
 CATALOGUE = "german.py"
