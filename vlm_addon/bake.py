@@ -10,6 +10,7 @@ import numpy as np
 
 from .core.errors import InvalidInput
 from .core.exact_tags import tagged_by_map
+from .core.light_marks import LightHistory, creation_marks
 from .core.light_mesh import VirtualLightMesh, join, require_valid
 from .core.progress import Progress, silent
 from .core.scene import Finding, Int32, SceneSnapshot
@@ -91,13 +92,14 @@ def bake(
     progress: Progress = silent,
     faces: SurfaceFaces | None = None,
     keep: VirtualLightMesh | None = None,
+    history: LightHistory | None = None,
 ) -> Bake:
     """The light mesh of a scene: `existing` where there is one and no `settings` ask for another, else a new one.
 
     faces: where given, a new light mesh and its surface get tags by which each face leaves out the lights that stand
-    for it. keep: lights that stay as they are, first in the new light mesh, and count. Raises InvalidInput where the
-    scene shows no surface that gets any light, or `existing` holds values that are not finite or negative, for fewer
-    lights than are kept, and for more links than there can be; Cancelled.
+    for it. keep: lights that stay as they are, first in the new light mesh, and count. history: how those of `existing`
+    were made. Raises InvalidInput where the scene shows no surface that gets any light, or `existing` holds values that
+    are not finite or negative, for fewer lights than are kept, and for more links than there can be; Cancelled.
     """
     creation, face_tags, meshes, paired_links = None, None, snapshot.meshes, None
     if existing is not None and settings is None:
@@ -121,7 +123,9 @@ def bake(
             meshes = faces.tagged(meshes, face_tags)
         if chosen.split_share > 0.0:
             light_mesh = _split(light_mesh, locked, chosen)
-    findings = check_light_mesh(light_mesh, meshes)
+    if creation is not None:
+        history = LightHistory(creation_marks(light_mesh))
+    findings = check_light_mesh(light_mesh, meshes, history=history)
     made = creation.findings if creation is not None else ()
     return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings), face_tags, paired_links)
 

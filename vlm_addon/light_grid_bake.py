@@ -12,6 +12,7 @@ import numpy as np
 from .core.finding_kinds import BROKEN
 from .core.light_grid import FEW_LIGHTS, RANGE, TOLERANCE, GridSettings, LightGrid
 from .core.light_grid_error import GridError, grid_error
+from .core.light_marks import LightHistory
 from .core.light_mesh import VirtualLightMesh, empty_light_mesh
 from .core.light_scale import PROBES
 from .core.progress import Progress, as_report, part, silent
@@ -147,14 +148,17 @@ def check_lights(
     light_mesh: VirtualLightMesh | None,
     settings: GridSettings | None,
     progress: Progress = silent,
+    history: LightHistory | None = None,
 ) -> tuple[Finding, ...]:
     """What is wrong with a scene's light mesh, and where its light grid does not do what `settings` say.
 
-    settings: None where all lights are summed. Raises InvalidInput, Cancelled.
+    settings: None where all lights are summed. history: how the lights were made, where that is known. Raises
+    InvalidInput, Cancelled.
     """
     checked = light_mesh if light_mesh is not None else empty_light_mesh()
     share = 1.0 if settings is None else LIGHT_MESH_TIME
-    findings = check_light_mesh(checked, snapshot.meshes, as_report(part(progress, 0.0, share), "light mesh"))
+    report = as_report(part(progress, 0.0, share), "light mesh")
+    findings = check_light_mesh(checked, snapshot.meshes, report, history=history)
     if not light_mesh or settings is None or any(finding.kind in BROKEN for finding in findings):
         return findings
     return (*findings, *bake_light_grid(snapshot, light_mesh, settings, part(progress, share, 1.0)).findings)

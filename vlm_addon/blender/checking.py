@@ -16,6 +16,7 @@ from .extraction.light_mesh_io import Extraction, LightOrigins, extract
 from .findings import list_findings
 from .following import animation
 from .light_grid_options import scene_grid_settings
+from .light_history import light_history
 from .source_changes import changed_sources
 
 
@@ -35,10 +36,11 @@ def check(context: Any) -> Callable[[Progress], Checked]:
     causes = changed_sources(context.scene, surface_hashes(found.snapshot.meshes))
     settings = scene_grid_settings(context.scene)
     budget = over_budget(context.scene, len(found.light_mesh or ()))
+    history = light_history(context.scene, found)
     notes = (*budget, *animation.left_behind(context.scene), *found.snapshot.findings)
 
     def work(progress: Progress) -> Checked:
-        findings = check_lights(found.snapshot, found.light_mesh, settings, progress)
+        findings = check_lights(found.snapshot, found.light_mesh, settings, progress, history)
         return Checked(found.snapshot.name, (*causes, *findings, *notes), found.origins)
 
     return work

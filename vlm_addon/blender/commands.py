@@ -26,6 +26,7 @@ from .extraction.extract import ExtractOptions
 from .extraction.light_mesh_io import Extraction, extract_light_mesh
 from .interface.availability import light_mesh_objects
 from .light_grid_options import keep_options, scene_grid_settings
+from .light_history import light_history
 from .names import NAME, SOURCES_PROPERTY
 from .scene_file import save_blend
 from .write_back import write_light_mesh
@@ -136,9 +137,10 @@ def check_command(arguments: Namespace) -> int:
     require_apart(arguments.scene, [arguments.json] if arguments.json is not None else [])
     opened, found = opened_scene(arguments)
     settings = scene_grid_settings(bpy.context.scene)
+    history = light_history(bpy.context.scene, found)
     light_count = len(found.light_mesh) if found.light_mesh is not None else 0
     findings = (
-        *check_lights(found.snapshot, found.light_mesh, settings, TerminalProgress()),
+        *check_lights(found.snapshot, found.light_mesh, settings, TerminalProgress(), history),
         *over_budget(bpy.context.scene, light_count),
     )
     for finding in findings:

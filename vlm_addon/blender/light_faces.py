@@ -14,7 +14,14 @@ import numpy.typing as npt
 
 from ..core.errors import InvalidInput
 from .extraction.mesh_arrays import ATTRIBUTE_COMPONENTS, ATTRIBUTE_FIELDS, read
-from .names import AREA_SCALE_ATTRIBUTE, COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, TAG_ATTRIBUTE
+from .names import (
+    AREA_SCALE_ATTRIBUTE,
+    COLOR_ATTRIBUTE,
+    EMISSION_ATTRIBUTE,
+    LOCK_ATTRIBUTE,
+    MARK_ATTRIBUTE,
+    TAG_ATTRIBUTE,
+)
 
 Bool = npt.NDArray[np.bool_]
 
@@ -24,6 +31,7 @@ TYPES = {
     TAG_ATTRIBUTE: "INT",
     AREA_SCALE_ATTRIBUTE: "FLOAT",
     LOCK_ATTRIBUTE: "INT",
+    MARK_ATTRIBUTE: "INT",
 }
 DEFAULTS: dict[str, tuple[float, ...]] = {
     COLOR_ATTRIBUTE: (1.0, 1.0, 1.0, 1.0),
@@ -31,6 +39,7 @@ DEFAULTS: dict[str, tuple[float, ...]] = {
     TAG_ATTRIBUTE: (0,),
     AREA_SCALE_ATTRIBUTE: (1.0,),
     LOCK_ATTRIBUTE: (0,),
+    MARK_ATTRIBUTE: (0,),
 }
 """What a face has where the attribute is missing."""
 LAYERS = {"FLOAT_COLOR": "float_color", "INT": "int", "FLOAT": "float"}

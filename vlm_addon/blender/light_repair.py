@@ -18,6 +18,7 @@ import numpy as np
 
 from ..core import finding_kinds as kinds
 from ..core.errors import InvalidInput
+from ..core.light_marks import LightHistory
 from ..core.light_mesh import VirtualLightMesh
 from ..core.mesh_topology import Int64
 from ..core.progress import Progress
@@ -29,6 +30,7 @@ from .checking import extract_edited
 from .extraction.light_mesh_io import LightOrigins
 from .findings import TAGGED, fixable, fixable_kinds
 from .light_faces import face_count, read_faces, write_faces
+from .light_history import light_history
 from .light_meshes import is_local, light_meshes
 from .names import (
     AREA_SCALE_ATTRIBUTE,
@@ -78,12 +80,13 @@ def work_on(context: Any, kind: str) -> Callable[[Progress], Fixed]:
     light_mesh, origins = found.light_mesh, found.origins
     if light_mesh is None or origins is None:
         raise InvalidInput("scene", "it has no virtual lights", "create some first")
+    history = light_history(context.scene, found)
     if kind in TAGGED:
-        rows = _rows(kind, light_mesh, found.snapshot.meshes)
+        rows = _rows(kind, light_mesh, found.snapshot.meshes, history)
         return _tag_work(context, origins.faces_by_object(rows))
 
     def work(progress: Progress) -> Repaired:
-        rows = _rows(kind, light_mesh, found.snapshot.meshes)
+        rows = _rows(kind, light_mesh, found.snapshot.meshes, history)
         repair = None
         if len(rows):
             repair = fix(kind, light_mesh, found.snapshot.meshes, rows, polygon_of_light=_polygons(origins))
@@ -99,8 +102,8 @@ def _polygons(origins: LightOrigins) -> Int64:
     return np.where(faces >= 0, stored, -1 - np.arange(len(faces)))
 
 
-def _rows(kind: str, light_mesh: VirtualLightMesh, meshes: Any) -> Int64:
-    findings = check_light_mesh(light_mesh, meshes)
+def _rows(kind: str, light_mesh: VirtualLightMesh, meshes: Any, history: LightHistory | None) -> Int64:
+    findings = check_light_mesh(light_mesh, meshes, history=history)
     rows = [row for finding in findings if finding.kind == kind for row in finding.lights]
     return np.unique(np.array(rows, np.int64))
 

@@ -25,6 +25,7 @@ EMISSION_ATTRIBUTE = "vlm_emission"
 TAG_ATTRIBUTE = "vlm_tag"
 AREA_SCALE_ATTRIBUTE = "vlm_area_scale"
 LOCK_ATTRIBUTE = "vlm_lock"
+MARK_ATTRIBUTE = "vlm_mark"
 
 ID_PROPERTY = "vlm_id"
 TAG_PROPERTY = "vlm_tag"

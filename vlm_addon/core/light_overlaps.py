@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .light_marks import UNMARKED, made_together
 from .light_mesh import SourceSamples, VirtualLightMesh
 from .mesh_topology import Bool, Int64, Rows, connected_components, half_edges, rows_by_key, sum_by
 from .progress import Report
-from .scene import Float64
+from .scene import Float64, Int32
 from .triangle_tree import build_tree
 
 # Cosine from which two lights face alike.
@@ -76,12 +77,19 @@ def _facing(light_mesh: VirtualLightMesh) -> Float64:
     return sum_by(owner, cosine, len(light_mesh))
 
 
-def covered_twice(light_mesh: VirtualLightMesh, report: Report = lambda share: None) -> Bool:
+def covered_twice(
+    light_mesh: VirtualLightMesh, report: Report = lambda share: None, marks: Int32 | None = None
+) -> Bool:
     """(n,) lights of which at least COVERED_SHARE of the source samples belong to others, too; of several that cover
-    each other, the largest and first stays. report: called with the share of the work that is done, may raise."""
+    each other, the largest and first stays. report: called with the share of the work that is done, may raise.
+
+    marks: (n,) int32 (light_marks.py). Lights that were made together do not count twice, however they lie: few lights
+    of many small bodies lie across each other.
+    """
     size = np.sqrt(light_mesh.areas)
     count = len(light_mesh)
-    light, above, weight = _covering_pairs(light_mesh, size, report)
+    marks = np.full(count, UNMARKED, np.int32) if marks is None else marks
+    light, above, weight = _covering_pairs(light_mesh, size, marks, report)
     twice = np.zeros(count, bool)
     if not len(light):
         return twice
@@ -107,7 +115,9 @@ def _rounded(sizes: Float64) -> Float64:
     return rounded
 
 
-def _covering_pairs(light_mesh: VirtualLightMesh, size: Float64, report: Report) -> tuple[Int64, Int64, Float64]:
+def _covering_pairs(
+    light_mesh: VirtualLightMesh, size: Float64, marks: Int32, report: Report
+) -> tuple[Int64, Int64, Float64]:
     """(light, other, weight of the sample) for every source sample of a light that lies in the region of another, too:
     behind it is the other, facing alike, and it is as high above that one's plane as that one's own samples are."""
     samples, corners = light_mesh.samples, light_mesh.corners
@@ -126,11 +136,14 @@ def _covering_pairs(light_mesh: VirtualLightMesh, size: Float64, report: Report)
     segment, met = build_tree(corners).all_met(start, end, report)
     light = owner[segment]
     chosen = (light != met) & (np.einsum("ij,ij->i", normal[light], normal[met]) > SIMILAR_COSINE)
+    chosen &= ~made_together(marks[light], marks[met])
     segment, light, met = segment[chosen], light[chosen], met[chosen]
     above = np.einsum("ij,ij->i", samples.positions[segment] - corners[met, 0], normal[met])
     chosen = (above > low[met] - near[met]) & (above < high[met] + near[met])
     segment, light, met = segment[chosen], light[chosen], met[chosen]
-    chosen = _among_samples(samples, segment, met)
+    # Copies of one light have one region.
+    chosen = (marks[light] == marks[met]) & (marks[light] != UNMARKED)
+    chosen[~chosen] = _among_samples(samples, segment[~chosen], met[~chosen])
     return light[chosen], met[chosen], samples.weights[segment[chosen]].astype(np.float64)
 
 

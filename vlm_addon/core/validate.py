@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import finding_kinds as kinds
 from .light_links import leaves_out
+from .light_marks import LightHistory
 from .light_mesh import VirtualLightMesh
 from .light_overlaps import badly_joined, covered_twice
 from .mesh_topology import Bool, Int64, normals_and_areas, rows_by_key, sum_by
@@ -46,22 +47,25 @@ def check_light_mesh(
     meshes: Sequence[Mesh] = (),
     report: Report = lambda share: None,
     light_of_triangle: Sequence[Int32] | None = None,
+    history: LightHistory | None = None,
 ) -> tuple[Finding, ...]:
     """Findings on `light_mesh`, the gravest first; none for a sound one. Their kinds are those of finding_kinds.py.
 
     meshes: the visible surface, for what lights and surface should share: tags, and whether a body is too thin for its
     lights. Reflectance is judged by colour alone; the strength that makes up for lost area is expected to exceed 1.
     report: called with the share of the work that is done, may raise. light_of_triangle: for each mesh the light of
-    each of its triangles, -1 for none, where that is known; the nearest lights by default.
+    each of its triangles, -1 for none, where that is known; the nearest lights by default. history: how the lights were
+    made, where that is known.
     """
     if not len(light_mesh):
         return (Finding(SUBJECT, "it has no lights", "create it from a selection, or draw lights", kinds.EMPTY),)
     broken = _broken(light_mesh)
     if broken:
         return tuple(broken)
-    surface = _surface(light_mesh, meshes, light_of_triangle, between(report, 0.0, NEAREST_TIME))
+    surface = _surface(light_mesh, meshes, light_of_triangle, history, between(report, 0.0, NEAREST_TIME))
     report(NEAREST_TIME)
-    found = [*_degenerate(light_mesh), *_joints(light_mesh, between(report, NEAREST_TIME, JOINTS_TIME))]
+    marks = None if history is None else history.marks
+    found = [*_degenerate(light_mesh), *_joints(light_mesh, marks, between(report, NEAREST_TIME, JOINTS_TIME))]
     found += _source_findings(light_mesh, surface, between(report, JOINTS_TIME, 1.0))
     return (*found, *_bright(light_mesh), *_lost_tags(light_mesh, meshes))
 
@@ -69,7 +73,7 @@ def check_light_mesh(
 @dataclass(frozen=True)
 class _Surface:
     """The visible surface, each triangle with its light, -1 for none. corners: (t, 3, 3). left_out: (t,) bool, whether
-    tags or links leave out that light. is_open: (t,) bool, of a shell with a border."""
+    tags or links leave out that light or it stands for something else. is_open: (t,) bool, of a shell with a border."""
 
     light_mesh: VirtualLightMesh
     corners: Float64
@@ -130,6 +134,7 @@ def _surface(
     light_mesh: VirtualLightMesh,
     meshes: Sequence[Mesh],
     light_of_triangle: Sequence[Int32] | None,
+    history: LightHistory | None,
     report: Report,
 ) -> _Surface:
     filled = [mesh for mesh in meshes if len(mesh.triangles)]
@@ -143,6 +148,9 @@ def _surface(
         lights = np.concatenate(light_of_triangle).astype(np.int64)
     tags = np.concatenate([mesh.tag_ids for mesh in filled])
     left_out = (lights >= 0) & leaves_out(light_mesh.links, light_mesh.tag_ids[lights], tags)
+    if history is not None and history.stands_for is not None:
+        mesh_of = np.repeat(np.arange(len(meshes)), [len(mesh.triangles) for mesh in meshes])
+        left_out |= (lights >= 0) & ~history.stands_for[history.light_mesh_of[lights], mesh_of]
     return _Surface(light_mesh, corners, lights, left_out, open_triangles(filled))
 
 
@@ -197,7 +205,7 @@ def _degenerate(light_mesh: VirtualLightMesh) -> list[Finding]:
     return found
 
 
-def _joints(light_mesh: VirtualLightMesh, report: Report) -> list[Finding]:
+def _joints(light_mesh: VirtualLightMesh, marks: Int32 | None, report: Report) -> list[Finding]:
     """Neighbours that face against each other, and lights that lie on others."""
     found: list[Finding] = []
     crossed = badly_joined(light_mesh)
@@ -206,7 +214,7 @@ def _joints(light_mesh: VirtualLightMesh, report: Report) -> list[Finding]:
         problem = f"{lights} against the lights beside (first: light {int(np.argmax(crossed))})"
         remedy = "flip them, so that all of a surface shine to one side"
         found.append(Finding(SUBJECT, problem, remedy, kinds.NON_MANIFOLD, _rows(np.flatnonzero(crossed))))
-    twice = covered_twice(light_mesh, report)
+    twice = covered_twice(light_mesh, report, marks)
     if twice.any():
         lights = "1 light lies" if twice.sum() == 1 else f"{int(twice.sum())} lights lie"
         problem = (

@@ -28,6 +28,7 @@ from ..names import (
     COLOR_ATTRIBUTE,
     EMISSION_ATTRIBUTE,
     LOCK_ATTRIBUTE,
+    MARK_ATTRIBUTE,
     TAG_ATTRIBUTE,
     is_light_mesh,
 )
@@ -181,7 +182,7 @@ def write_lights(context: Any, made: NewLights, thing: Any | None) -> tuple[Any,
 
 def _reset(thing: Any, before: int) -> None:
     """The values that new lights do not take from the surface are as in a light mesh without that attribute."""
-    for name in (AREA_SCALE_ATTRIBUTE, LOCK_ATTRIBUTE):
+    for name in (AREA_SCALE_ATTRIBUTE, LOCK_ATTRIBUTE, MARK_ATTRIBUTE):
         rows = read_faces(thing, name)
         rows[before:] = DEFAULTS[name][0]
         write_faces(thing, name, rows)

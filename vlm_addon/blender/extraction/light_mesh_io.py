@@ -18,6 +18,7 @@ from ..names import (
     COLOR_ATTRIBUTE,
     DYNAMIC_PROPERTY,
     EMISSION_ATTRIBUTE,
+    MARK_ATTRIBUTE,
     SCHEMA_PROPERTY,
     SCHEMA_VERSION,
     TAG_ATTRIBUTE,
@@ -40,12 +41,14 @@ WHITE = (1.0, 1.0, 1.0)
 class LightOrigins:
     """Where the lights of a scene are stored. objects: names of the light meshes, in the order of their lights and
     vertices. vertex_counts: of each. owner: (n,) int32, row in objects. faces: (n,) int32, the face of the stored mesh
-    that each light is (a part of), -1 where modifiers made it or the light mesh is linked."""
+    that each light is (a part of), -1 where modifiers made it or the light mesh is linked. marks: (n,) int32, with whom
+    each was made (core/light_marks.py)."""
 
     objects: tuple[str, ...]
     vertex_counts: tuple[int, ...]
     owner: Int32
     faces: Int32
+    marks: Int32
 
     def faces_by_object(self, lights: npt.ArrayLike) -> dict[str, Int32]:
         """The stored faces of some lights, (k,) rows, by the name of their object, each once, ascending."""
@@ -72,6 +75,7 @@ class _Read:
     lights: VirtualLightMesh
     name: str
     faces: Int32
+    marks: Int32
 
 
 def extract(options: ExtractOptions | None = None, depsgraph: Any = None, broken_values: bool = False) -> Extraction:
@@ -118,8 +122,13 @@ def _both(
 def origins_of(thing: Any) -> LightOrigins:
     """The origins of the lights of one light mesh of triangles, as `write_light_mesh` has just stored it."""
     count = len(thing.data.polygons)
+    marks = face_attribute(thing.data, MARK_ATTRIBUTE, "INT")
     return LightOrigins(
-        (thing.name,), (len(thing.data.vertices),), np.zeros(count, np.int32), np.arange(count, dtype=np.int32)
+        (thing.name,),
+        (len(thing.data.vertices),),
+        np.zeros(count, np.int32),
+        np.arange(count, dtype=np.int32),
+        np.zeros(count, np.int32) if marks is None else marks,
     )
 
 
@@ -127,7 +136,8 @@ def _origins(found: list[_Read]) -> LightOrigins:
     owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(each.faces) for each in found])
     names = tuple(each.name for each in found)
     vertices = tuple(len(each.lights.vertices) for each in found)
-    return LightOrigins(names, vertices, owner, np.concatenate([each.faces for each in found]))
+    faces, marks = (np.concatenate(parts) for parts in zip(*((each.faces, each.marks) for each in found), strict=True))
+    return LightOrigins(names, vertices, owner, faces, marks)
 
 
 def _with_source_points(
@@ -208,7 +218,8 @@ def _read_lights(
     local = read_mesh(mesh, owner)
     if not len(local.triangles):
         report(owner, "it has no faces", "it gives no light: draw some, or delete it")
-        return _Read(empty_light_mesh(), blender_object.original.name, np.zeros(0, np.int32))
+        none = np.zeros(0, np.int32)
+        return _Read(empty_light_mesh(), blender_object.original.name, none, none)
     count = len(mesh.polygons)
     color = face_attribute(mesh, COLOR_ATTRIBUTE, "FLOAT_COLOR")
     if color is None:
@@ -240,4 +251,6 @@ def _read_lights(
         samples=unsampled(lights),
         links=read_links(blender_object),
     )
-    return _Read(read, original.name, local.faces if stored else np.full(lights, -1, np.int32))
+    marks = face_attribute(mesh, MARK_ATTRIBUTE, "INT")
+    marks = (np.zeros(count, np.int32) if marks is None else marks)[local.faces]
+    return _Read(read, original.name, local.faces if stored else np.full(lights, -1, np.int32), marks)

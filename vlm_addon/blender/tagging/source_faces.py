@@ -93,7 +93,7 @@ def read_source_faces(options: ExtractOptions | None = None) -> SourceFaces:
     with _faces_numbered(places):
         numbered = extract_scene(options)
     wholes = {place.name: place.first for place in places if not place.of_mesh}
-    owners = tuple(_owners(mesh.name) for mesh in numbered.meshes)
+    owners = tuple(owners_of(mesh.name) for mesh in numbered.meshes)
     rows: list[Int32] = []
     known: list[Int32] = []
     read_only: set[str] = set()
@@ -220,7 +220,7 @@ def _tags_replaced(thing: Any, tags: Int32) -> Iterator[None]:
         attributes.active_index = active
 
 
-def _owners(name: str) -> tuple[str, ...]:
+def owners_of(name: str) -> tuple[str, ...]:
     """Names of the object, and of what instances it, that a mesh of a snapshot is named after (extract.py)."""
     if bpy.data.objects.get(name) is not None:
         return (name,)
