@@ -10,7 +10,6 @@ import time
 import bpy
 from sidebar_steps import (
     STEP_PIXELS,
-    adjust_last,
     copied_under_mouse,
     ended_operators,
     ended_since,
@@ -57,8 +56,6 @@ LAST_USED = {
     "gradient_color": {"last_color": (0.0, 0.5, 1.0)},
 }
 """What the artist gave these when they were used last: with their defaults they would change nothing here."""
-ADJUSTED = {"set_strength": "5"}
-"""What is put into the first number of Adjust Last Operation."""
 NOT_UNDONE = {
     "open_documentation",
     "copy_diagnostics",
@@ -115,8 +112,6 @@ def press_in(situation, arrange, name):
         told = yield from press_button(name, follow=WAITING.get(name))
     if name == "light_scene" and told["did"]:
         yield from until(picture_is_ready)
-    if name in ADJUSTED:
-        told["adjusted"] = yield from adjust_last("number", ADJUSTED[name])
     yield from look(f"{situation}_{name}".replace(" ", "_"))
     after = content()
     told["changed"] = bool(difference(before, after))

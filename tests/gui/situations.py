@@ -106,6 +106,14 @@ def copies_with_tags():
     choose(first_lights())
 
 
+def two_light_meshes():
+    """Of different strength: the button gives both that of the first, before the artist adjusts it."""
+    copies_with_tags()
+    choose(*light_meshes())
+    for number, thing in enumerate(light_meshes()):
+        thing["vlm_strength"] = 1.0 + number
+
+
 def lights_that_follow():
     choose(first_lights(), cube())
     with in_view():
@@ -134,7 +142,7 @@ SITUATIONS = (
         lights_selected,
         (
             *("create_again", "lock_lights", "pick_color", "fill_color", "multiply_color", "shift_hue"),
-            *("gradient_color", "recolor_from_materials", "set_strength", "pair_tags", "tag_thin"),
+            *("gradient_color", "recolor_from_materials", "pair_tags", "tag_thin"),
             *("show_light_grid", "bake_grid", "check_bake", "clear_bake"),
         ),
     ),
@@ -146,6 +154,7 @@ SITUATIONS = (
     ("lights locked", lights_locked, ("unlock_lights",)),
     ("lights tagged", lights_tagged, ("clear_tag",)),
     ("copies with tags", copies_with_tags, ("repair_tags",)),
+    ("two light meshes", two_light_meshes, ("set_strength",)),
     ("lights that follow", lights_that_follow, ("stop_following",)),
     ("faces edited", faces_edited, ("draw_fill",)),
 )

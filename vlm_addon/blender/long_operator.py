@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any, Generic, TypeVar
 
 import bpy
@@ -16,6 +17,19 @@ SECONDS_BETWEEN_LOOKS = 0.2
 PROGRESS_STEPS = 100
 
 T = TypeVar("T")
+
+_RUNNING: list[Any] = []
+"""Operators that go on in the window: Blender forgets them without a word where the extension is disabled."""
+
+
+def register(undo: ExitStack) -> None:
+    """Where the extension is disabled amid long work, the work ends, with its timer and its texts."""
+    undo.callback(_end_all)
+
+
+def _end_all() -> None:
+    for operator in list(_RUNNING):
+        operator.cancel(bpy.context)
 
 
 class LongOperator(Generic[T]):
@@ -80,6 +94,7 @@ class LongOperator(Generic[T]):
         window_manager.progress_begin(0, PROGRESS_STEPS)
         self._timer = window_manager.event_timer_add(SECONDS_BETWEEN_LOOKS, window=context.window)
         window_manager.modal_handler_add(self)
+        _RUNNING.append(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -113,6 +128,8 @@ class LongOperator(Generic[T]):
         context.workspace.status_text_set(f"{label} {self._work.fraction:.0%} (Esc cancels)")
 
     def _clean_up(self, context: bpy.types.Context) -> None:
+        if self in _RUNNING:
+            _RUNNING.remove(self)
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace is not None:

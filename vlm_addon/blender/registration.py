@@ -8,14 +8,14 @@ from contextlib import ExitStack
 
 import bpy
 
-from . import authoring, cli_commands, engine, migration
+from . import authoring, cli_commands, engine, long_operator, migration
 from .baking import bake_state
 from .drawing import draw_tool
 from .interface import engine_panels, menus, panels, properties, render_panels, setting_presets, translation
 from .overlays import overlays
 from .render_process import KEPT
 
-PARTS = (migration, bake_state, draw_tool, setting_presets, menus, translation, overlays)
+PARTS = (migration, bake_state, draw_tool, setting_presets, menus, translation, overlays, long_operator)
 """Modules with a `register(undo: ExitStack)`, in order."""
 
 _REGISTERED = ExitStack()

@@ -200,7 +200,7 @@ OPERATORS = {
 BUTTONS = {
     "Light Polygon": "Lichtpolygon",
     "Light Rectangle": "Lichtrechteck",
-    "Extrude Lights": "Lichter entlangziehen",
+    "Extrude Lights": "Lichtstreifen",
     "Cut Lights": "Lichter schneiden",
     "Erase Lights": "Lichter radieren",
     "Render Image": "Bild rendern",
