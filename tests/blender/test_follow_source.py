@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from vlm_addon.bake import BakeSettings
-from vlm_addon.blender import authoring
+from vlm_addon.blender import authoring, checking
+from vlm_addon.blender.baking import bake_state
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.following import animation
 from vlm_addon.blender.following.follow_source import RIG, SURFACE, follow_sources, stop_following
 from vlm_addon.blender.following.surface_transfer import evaluated_surface
 from vlm_addon.blender.interface.properties import ensure_scene_settings
+from vlm_addon.blender.light_meshes import sources
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import SourceSamples, VirtualLightMesh
@@ -526,3 +528,28 @@ def test_a_new_light_mesh_of_the_dancer_dances_as_close_to_her_as_it_was_made(sa
         scene.frame_set(frame)
         for name, distance in bound.items():
             assert apart(name).mean() == pytest.approx(distance, rel=0.05), (name, frame)
+
+
+@pytest.mark.usefixtures("watched_bakes")
+def test_following_keeps_a_light_mesh_up_to_date_with_what_moves_and_is_renamed(make_cube, scene):
+    """Of two sources the one that moves gets lights of its own, and neither asks to be made again."""
+    still, moving = make_cube("Still"), make_cube("Moving")
+    moving.location.x = 5.0
+    bpy.context.view_layer.update()
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
+    thing = bpy.data.objects["VLM"]
+    still.name = "Renamed"
+    moving.keyframe_insert("location", frame=1)
+    moving.location.x = 6.0
+    moving.keyframe_insert("location", frame=10)
+    scene.frame_set(1)
+    thing.select_set(True)
+    still.select_set(False)
+    moving.select_set(False)
+    animation.follow(bpy.context)
+    assert [each.name for each in sources(bpy.data.objects["VLM Moving"], scene)] == ["Moving"]
+    assert [each.name for each in sources(thing, scene)] == ["Renamed"]
+    assert checking.check(bpy.context)(silent).findings == ()
+    assert bake_state.compare(bpy.context) == ()
+    scene.frame_set(5)
+    assert checking.check(bpy.context)(silent).findings == ()

@@ -26,9 +26,9 @@ def again_problem(context: Any) -> str | None:
     except InvalidInput as error:
         return str(error)
     if not known:
-        return f"{thing.name} was drawn by hand: there is nothing to make it from"
+        return f"{thing.name} was drawn by hand: draw into it, or create another one from objects"
     if not any(source is not None for source in known):
-        return f"All that {thing.name} was made from is gone"
+        return f"All that {thing.name} was made from is gone: undo, or create another light mesh"
     return "Leave this mode first (Tab): light meshes are made in Object Mode" if context.mode != "OBJECT" else None
 
 

@@ -49,9 +49,9 @@ def bake_problem(context: Any) -> str | None:
 def clear_problem(context: Any) -> str | None:
     """Why there is no baked data to remove, or None."""
     if context.scene.library is not None:
-        return f"The scene is linked from {context.scene.library.filepath}: its baked data belongs to that file"
+        return f"The scene is linked from {context.scene.library.filepath}: open that file, its baked data belongs to it"
     if not bake_store.grid_path(context.scene).is_file():
-        return "No light grid is baked for this scene"
+        return "No light grid is baked for this scene: Bake Light Grid makes one"
     return None
 
 

@@ -26,7 +26,7 @@ from ..interface.availability import GEOMETRY_TYPES
 from ..interface.properties import technique_settings
 from ..interface.translation import told
 from ..light_grid_options import TECHNIQUE, scene_grid_settings
-from ..light_meshes import light_meshes
+from ..light_meshes import light_meshes, source_names, sources
 from ..names import DYNAMIC_PROPERTY, LINKS_PROPERTY
 from ..stored_values import plain, text, wrong_value
 from . import bake_store
@@ -100,7 +100,7 @@ def compare(context: Any) -> tuple[str, ...]:
     hashes = surface_hashes(found.snapshot.meshes)
     changes = []
     for thing in light_meshes(scene):
-        before = made_from(thing)
+        before = made_from_by_present_names(thing, scene)
         changes += [f"{thing.name}: {phrase}" for phrase in surface_changes(before, hashes)] if before else []
     stored, settings = bake_store.stored_key(scene), scene_grid_settings(scene)
     if stored is not None and (found.light_mesh is None or settings is None):
@@ -125,6 +125,21 @@ def made_from(thing: Any) -> dict[str, str]:
         return dict(BakeKey.from_json(tree, MADE_FROM_PROPERTY).surfaces)
     except (ValueError, InvalidInput) as error:
         raise wrong_value(thing, MADE_FROM_PROPERTY, "what a light mesh was made from") from error
+
+
+def made_from_by_present_names(thing: Any, scene: Any) -> dict[str, str]:
+    """`made_from` by the names that the sources have now: renaming changes no surface. Raises InvalidInput."""
+    pairs = zip(source_names(thing), sources(thing, scene), strict=True)
+    present = {name: source.name for name, source in pairs if source is not None}
+    return {present.get(name, name): found for name, found in made_from(thing).items()}
+
+
+def readable_made_from(thing: Any, scene: Any) -> dict[str, str]:
+    """`made_from_by_present_names`, empty where it cannot be read: comparing says so, following goes on."""
+    try:
+        return made_from_by_present_names(thing, scene)
+    except InvalidInput:
+        return {}
 
 
 def set_made_from(thing: Any, hashes: Mapping[str, str]) -> None:

@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+from ...core.bake_key import surface_hashes
 from ...core.counting import counted
 from ...core.errors import VlmError
 from ...core.scene import Finding
+from ..baking.bake_state import readable_made_from, set_made_from
 from ..extraction.dynamics import is_dynamic
+from ..extraction.extract import ExtractOptions, extract_scene
 from ..interface.availability import has_geometry
 from ..light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
 from .follow_rig import is_following
@@ -28,7 +32,7 @@ def free_problem(context: Any) -> str | None:
     """Why no light mesh can be freed, or None."""
     problem = _selection_problem(context)
     if problem is None and not any(map(is_following, chosen_light_meshes(context))):
-        return "No selected light mesh follows its source"
+        return "No selected light mesh follows its source: select one that does"
     return problem
 
 
@@ -42,7 +46,18 @@ def follow(context: Any, way: str = AUTO) -> list[tuple[str, str]]:
     for thing in things:
         require_followable(thing, context, others)
     done = [entry for thing in things for entry in follow_sources(thing, context, others, way)]
+    _keep_up_to_date(context.scene, {context.scene.objects[entry.light_mesh]: entry.source for entry in done})
     return [_report(entry) for entry in done]
+
+
+def _keep_up_to_date(scene: Any, followed: dict[Any, str]) -> None:
+    """Light meshes that were up to date are so with a source that moves by now: it is known by its shape alone then."""
+    meshes = extract_scene(ExtractOptions(objects=frozenset(followed.values()))).meshes
+    moving, still = surface_hashes(meshes), surface_hashes(replace(mesh, dynamic=False) for mesh in meshes)
+    for thing, source in followed.items():
+        before = readable_made_from(thing, scene)
+        if source in moving and before.get(source) == still[source]:
+            set_made_from(thing, {**before, source: moving[source]})
 
 
 def free(context: Any) -> int:

@@ -9,8 +9,9 @@ from typing import Any
 import bmesh
 import numpy as np
 
+from ..baking.bake_state import readable_made_from, set_made_from
 from ..extraction.mesh_arrays import read
-from ..light_meshes import set_sources, source_names
+from ..light_meshes import set_sources, source_names, sources
 from ..names import NAME
 from .surface_transfer import evaluated_surface, nearest, normals_to_world, to_world
 
@@ -22,6 +23,7 @@ def separate_by_source(thing: Any, found: Sequence[Any], moving: Sequence[Any], 
     `thing` keeps what is left, or, where nothing is, stands for the last of `moving`.
     """
     owners = _owners(thing, found, context)
+    made_from = readable_made_from(thing, context.scene)
     # The source that the light mesh is named after comes last: it is the one that may keep it.
     ordered = sorted(moving, key=lambda source: thing.name == f"{NAME} {source.name}")
     parts: list[tuple[Any, Any]] = []
@@ -30,14 +32,24 @@ def separate_by_source(thing: Any, found: Sequence[Any], moving: Sequence[Any], 
         if not mine.any():
             continue
         if mine.all():
-            set_sources(thing, [source.name], context.scene)
+            _stands_for(thing, [source.name], made_from, context.scene)
             return [*parts, (thing, source)]
         parts.append((_taken_out(thing, mine, source, context), source))
+        _stands_for(parts[-1][0], [source.name], made_from, context.scene)
         owners = owners[~mine]
     if parts:
-        gone = {source.name for _, source in parts}
-        set_sources(thing, [name for name in source_names(thing) if name not in gone], context.scene)
+        gone = [source for _, source in parts]
+        known = zip(source_names(thing), sources(thing, context.scene), strict=True)
+        left = [name if source is None else source.name for name, source in known if source not in gone]
+        _stands_for(thing, left, made_from, context.scene)
     return parts
+
+
+def _stands_for(thing: Any, names: list[str], made_from: dict[str, str], scene: Any) -> None:
+    """Only these objects, by their present names, are what `thing` was made from."""
+    set_sources(thing, names, scene)
+    if made_from:
+        set_made_from(thing, {name: found for name, found in made_from.items() if name in names})
 
 
 def has_lights_of(thing: Any, found: Sequence[Any], moving: Sequence[Any], context: Any) -> bool:
@@ -66,7 +78,6 @@ def _taken_out(thing: Any, mine: np.ndarray, source: Any, context: Any) -> Any:
         collection.objects.link(copy)
     _delete_faces(thing.data, mine)
     _delete_faces(copy.data, ~mine)
-    set_sources(copy, [source.name], context.scene)
     return copy
 
 
