@@ -24,19 +24,21 @@ from ..light_faces import chosen_faces, read_faces, write_faces
 from ..light_meshes import LARGEST_ID, is_local, require_editable, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
 from ..stored_values import remove_value, set_value
+from .shown_things import instanced_ids, shown_things
 from .stored_links import read_links, write_links
 
 
 @dataclass(frozen=True)
 class Tagged:
-    """What was tagged: the id, lights, faces of visible objects, objects as a whole, and objects whose faces keep ids
-    of their own because others share the mesh."""
+    """What was tagged: the id, lights, faces of visible objects, objects as a whole, objects whose faces keep ids of
+    their own because others share the mesh, and objects whose instances keep theirs."""
 
     tag: int
     lights: int
     faces: int
     objects: int
     shared: int
+    instanced: int = 0
 
 
 def chosen_things(context: Any) -> list[Any]:
@@ -92,13 +94,13 @@ def tags_of_lights(replaced: Any = None, links: bool = True) -> Int32:
 
 def assign_tag(context: Any, tag: int) -> Tagged:
     """Give `tag`, or a new id for UNTAGGED, to the chosen faces or objects. Raises InvalidInput."""
-    return _tag(chosen_things(context), tag if tag != UNTAGGED else unused_tag())
+    return _tag(context, chosen_things(context), tag if tag != UNTAGGED else unused_tag())
 
 
 def clear_tag(context: Any) -> Tagged:
     """Take the ids of the chosen faces or objects away, with links from ids that a light mesh no longer has."""
     things = chosen_things(context)
-    cleared = _tag(things, UNTAGGED)
+    cleared = _tag(context, things, UNTAGGED)
     for thing in things:
         if is_light_mesh(thing) and thing.mode == "OBJECT":
             links = read_links(thing)
@@ -108,8 +110,10 @@ def clear_tag(context: Any) -> Tagged:
     return cleared
 
 
-def _tag(things: Sequence[Any], tag: int) -> Tagged:
+def _tag(context: Any, things: Sequence[Any], tag: int) -> Tagged:
     _require_writable(things)
+    shown = shown_things(context) if any(thing.mode != "EDIT" and not is_light_mesh(thing) for thing in things) else {}
+    instanced = 0
     lights = faces = objects = shared = 0
     for thing in things:
         if is_light_mesh(thing) or thing.mode == "EDIT":
@@ -127,7 +131,8 @@ def _tag(things: Sequence[Any], tag: int) -> Tagged:
                 _untag_faces(thing)
             else:
                 shared += 1
-    return Tagged(tag, lights, faces, objects, shared)
+        instanced += tag != UNTAGGED and instanced_ids(thing, shown)
+    return Tagged(tag, lights, faces, objects, shared, instanced)
 
 
 def _tag_faces(thing: Any, tag: int) -> int:
@@ -165,6 +170,9 @@ def tagged_text(tagged: Tagged) -> str:
     told = f"{verb} {', '.join(part for part in parts if part)}"
     if tagged.shared:
         told += f"; faces of {counted(tagged.shared, 'object')} keep theirs: others share the mesh"
+    if tagged.instanced:
+        what = "1 object instances keeps its own id" if tagged.instanced == 1 else "these instance keeps its own ids"
+        told += f"; what {what}: clear that first (Clear Tag), all instances have it"
     return told
 
 

@@ -26,6 +26,7 @@ from ..light_meshes import chosen_light_meshes, is_local, light_meshes, new_tags
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
 from ..stored_values import set_value, whole_number
 from .light_tags import tags_of_lights
+from .shown_things import Shown, require_alone, shown_things
 from .stored_links import read_links, read_paired_links, write_links
 from .unused_ids import forget_unused
 
@@ -67,12 +68,15 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
     """Let the chosen lights leave out `receivers`.
 
     Lights without a tag get a new id, one for each mesh; so does each receiver that has faces without any. Raises
-    InvalidInput, before anything changes, without lights or receivers and for linked data that would have to change.
+    InvalidInput, before anything changes, without lights or receivers, for linked data that would have to change, and
+    for what cannot be told apart from other objects.
     """
     chosen = _chosen_lights(context)
     if not receivers:
         remedy = "select the visible objects as well, or give the name of one"
         raise InvalidInput("receiver links", "there is no object to be left out", remedy)
+    shown = shown_things(context)
+    require_alone(receivers, shown)
     untagged = [each for each in chosen if (each.tags == UNTAGGED).any()]
     bare = [thing for thing in receivers if _needs_tag(thing)]
     for thing in bare:
@@ -83,7 +87,7 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
     light_ids = {each.mesh: number for each, number in zip(untagged, ids, strict=False)}
     receiver_ids = dict(zip((thing.name_full for thing in bare), ids[len(untagged) :], strict=True))
     receiver_tags = np.unique(
-        np.concatenate([[*_receiver_tags(thing), *_own(receiver_ids, thing.name_full)] for thing in receivers])
+        np.concatenate([[*_receiver_tags(thing, shown), *_own(receiver_ids, thing.name_full)] for thing in receivers])
     )
     made = {each.mesh: _products(_with_new(each.tags, light_ids.get(each.mesh)), receiver_tags) for each in chosen}
     things = chosen_light_meshes(context)
@@ -114,7 +118,8 @@ def unlink_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
     chosen = _chosen_lights(context)
     paired = np.concatenate([make_links([]), *(read_paired_links(thing) for thing in light_meshes(context.scene))])
     light_tags = _with_former(np.unique(np.concatenate([each.tags for each in chosen])), paired)
-    receiver_tags = [tag for thing in receivers for tag in _receiver_tags(thing)]
+    shown = shown_things(context)
+    receiver_tags = [tag for thing in receivers for tag in _receiver_tags(thing, shown)]
     remaining, gone = {}, [np.zeros((0, 2), np.int32)]
     for thing in light_meshes(context.scene):
         links = read_links(thing)
@@ -207,13 +212,15 @@ def _needs_tag(thing: Any) -> bool:
     return bool((read_faces(thing, TAG_ATTRIBUTE) == UNTAGGED).any())
 
 
-def _receiver_tags(thing: Any) -> Iterator[int]:
+def _receiver_tags(thing: Any, shown: Shown) -> Iterator[int]:
     """Of a visible object, and of what it instances."""
     yield from tags_of(thing).tolist()
+    for each in shown.get(thing.name, {}).values():
+        yield from tags_of(each).tolist()
     if thing.instance_type == "COLLECTION" and thing.instance_collection is not None:
         for each in thing.instance_collection.all_objects:
             if not is_light_mesh(each):
-                yield from _receiver_tags(each)
+                yield from _receiver_tags(each, {})
 
 
 def _own(ids: dict[str, int], name: str) -> list[int]:
