@@ -25,6 +25,7 @@ FACE_TYPES = {
     "vlm_tag": "INT",
     "vlm_area_scale": "FLOAT",
     "vlm_lock": "INT",
+    "vlm_mark": "INT",
 }
 FIELDS = {"FLOAT_COLOR": "color", "BYTE_COLOR": "color", "FLOAT_VECTOR": "vector", "FLOAT2": "vector"}
 SIZES = {"FLOAT_COLOR": 4, "BYTE_COLOR": 4, "FLOAT_VECTOR": 3, "FLOAT2": 2, "INT32_2D": 2, "INT16_2D": 2}
