@@ -12,12 +12,15 @@ from .core.errors import InvalidInput
 from .core.exact_tags import tagged_by_map
 from .core.light_marks import LightHistory, creation_marks
 from .core.light_mesh import VirtualLightMesh, join, require_valid
-from .core.progress import Progress, silent
+from .core.progress import Progress, as_report, part, silent
 from .core.scene import Finding, Int32, SceneSnapshot
 from .core.settings import OWN, setting
 from .core.simplify import SimplifyReport, SimplifySettings, create_light_mesh, subdivide_light_mesh
 from .core.tag_pairs import SurfaceFaces
 from .core.validate import check_light_mesh
+
+# Share of the work that is done when lights are made and yet to be checked.
+CREATION_TIME = 0.85
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,7 @@ def bake(
     are not finite or negative, for fewer lights than are kept, and for more links than there can be; Cancelled.
     """
     creation, face_tags, meshes, paired_links = None, None, snapshot.meshes, None
+    light_of_triangle = None
     if existing is not None and settings is None:
         require_valid(existing)
         light_mesh = existing
@@ -112,8 +116,8 @@ def bake(
         chosen = settings or BakeSettings()
         locked = len(keep) if keep is not None else 0
         shape = replace(chosen, target_triangles=max(chosen.shape_lights, min(locked + 1, chosen.target_triangles)))
-        created = create_light_mesh(snapshot.meshes, shape, progress, keep)
-        light_mesh, creation = created.light_mesh, created.report
+        created = create_light_mesh(snapshot.meshes, shape, part(progress, 0.0, CREATION_TIME), keep)
+        light_mesh, creation, light_of_triangle = created.light_mesh, created.report, created.light_of_triangle
         if not len(light_mesh):
             problem = "none of its surface gets a light: it has no area, or is painted with None Here"
             raise InvalidInput(f"scene {snapshot.name!r}", problem, "choose other surfaces, or paint less of None Here")
@@ -122,10 +126,11 @@ def bake(
             face_tags, paired_links = tags.face_tags, tags.paired
             meshes = faces.tagged(meshes, face_tags)
         if chosen.split_share > 0.0:
-            light_mesh = _split(light_mesh, locked, chosen)
+            light_mesh, light_of_triangle = _split(light_mesh, locked, chosen), None
     if creation is not None:
         history = LightHistory(creation_marks(light_mesh))
-    findings = check_light_mesh(light_mesh, meshes, history=history)
+    checking = as_report(part(progress, 0.0 if creation is None else CREATION_TIME, 1.0), "check")
+    findings = check_light_mesh(light_mesh, meshes, checking, light_of_triangle, history)
     made = creation.findings if creation is not None else ()
     return Bake(light_mesh, creation, (*findings, *made, *snapshot.findings), face_tags, paired_links)
 

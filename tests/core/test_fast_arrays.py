@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from vlm_addon.core.corner_arrays import highest, lowest, middles, squares
-from vlm_addon.core.mesh_topology import sorted_with_order, used_only
+from vlm_addon.core.mesh_topology import Rows, sorted_with_order, used_only
 from vlm_addon.core.parallel import side_by_side, slices
+from vlm_addon.core.region_heights import RegionCorners
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def test_order_is_numpys_stable_order(random, bound, count):
 
 
 @pytest.mark.parametrize(
-    "quick, plain", [(lowest, np.min), (highest, np.max), (middles, np.mean)], ids=["lowest", "highest", "middles"]
+    ("quick", "plain"), [(lowest, np.min), (highest, np.max), (middles, np.mean)], ids=["lowest", "highest", "middles"]
 )
 def test_corners_are_reduced_to_the_bit(random, quick, plain):
     corners = random.normal(size=(999, 3, 3)) * 10.0 ** random.integers(-9, 9, (999, 1, 1))
@@ -78,3 +79,17 @@ def test_what_a_part_raises_is_raised():
 
     with pytest.raises(ValueError, match="seven"):
         list(side_by_side(work, range(50)))
+
+
+def test_heights_and_places_of_regions_are_those_of_their_corners(random):
+    source = random.choice(np.linspace(-1.0, 1.0, 7), (60, 3, 3))
+    lengths = np.array([20, 0, 25, 15])
+    regions = Rows(random.permutation(60), np.concatenate([[0], np.cumsum(lengths)]))
+    points, normals = random.normal(size=(4, 3)), random.normal(size=(4, 3))
+    places = RegionCorners.of(regions, source)
+    found = np.split(places.heights(points, normals), places.starts[1:-1])
+    for light, rows in enumerate(np.split(regions.values, regions.starts[1:-1])):
+        # Each place once, where it is named first.
+        distinct = list(dict.fromkeys(map(tuple, source[rows].reshape(-1, 3).tolist())))
+        expected = [(np.array(place) - points[light]) @ normals[light] for place in distinct]
+        np.testing.assert_allclose(found[light], expected, rtol=0.0, atol=1e-12)

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec
 
 import bpy
 import numpy as np
@@ -39,6 +41,8 @@ from .tagging.stored_links import mark_paired
 from .target_light_mesh import find_replaced, unused_name
 from .write_back import write_light_mesh
 
+P = ParamSpec("P")
+
 TAG_REGIONS = {
     "tag_regions": bpy.props.BoolProperty(
         name="Tag Regions",
@@ -57,6 +61,7 @@ class Made:
     name is None where the scene keeps the light meshes that it has, which are at `origins`. made_from: hashes of the
     surfaces, so that it can be told later whether they have changed. tagged: where new tags of them go, None without.
     locked: how many lights, the first, were kept. gone: names of objects that it is not made from any more.
+    started: time.perf_counter() when the first of it was read.
     """
 
     bake: Bake
@@ -68,6 +73,19 @@ class Made:
     tagged: SourceFaces | None = None
     locked: int = 0
     gone: tuple[str, ...] = ()
+    started: float = 0.0
+
+
+def timed(begin: Callable[P, Callable[[Progress], Made]]) -> Callable[P, Callable[[Progress], Made]]:
+    """`begin`, with what its work makes told when it began: reading is a part of it."""
+
+    @wraps(begin)
+    def begun(*values: P.args, **named: P.kwargs) -> Callable[[Progress], Made]:
+        started = time.perf_counter()
+        work = begin(*values, **named)
+        return lambda progress: replace(work(progress), started=started)
+
+    return begun
 
 
 def from_selection(context: Any, settings: BakeSettings, tag_regions: bool = False) -> Callable[[Progress], Made]:
@@ -110,6 +128,7 @@ def _in_its_place(
     return from_objects(things, replaced.name, settings, tag_regions, keep)
 
 
+@timed
 def from_objects(
     things: list[Any],
     name: str,
@@ -131,11 +150,13 @@ def from_objects(
     return _work(tagged.snapshot, name, sources, settings, tagged, keep, gone)
 
 
+@timed
 def from_visible_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
     """Work that makes a light mesh of the visible scene where it has none, and checks the one it has."""
     return _work_on_scene(context, extract(), settings)
 
 
+@timed
 def from_lit_scene(context: Any, settings: BakeSettings) -> Callable[[Progress], Made]:
     """The same for a scene that is about to be rendered. Raises InvalidInput where nothing in it sends out light."""
     found = extract()
@@ -203,8 +224,8 @@ def write(made: Made) -> str:
     write_faces(written, MARK_ATTRIBUTE, creation_marks(made.bake.light_mesh))
     set_made_from(written, made.made_from)
     list_findings(scene, findings, origins_of(written))
-    seconds = sum(milliseconds for _, milliseconds in made.bake.creation.milliseconds) / 1000
     again = animation.follow_again(written, followed, bpy.context)
+    seconds = time.perf_counter() - made.started
     missing = phrases(made.gone, [name for name in made.sources if name not in made.made_from])
     notes = "".join(f"; {note}" for note in (*missing, *(finding.problem for finding in twice)))
     triangles = counted(made.bake.creation.source_triangles, "triangle")

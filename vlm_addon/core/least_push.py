@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .mesh_topology import Int64, Rows, sum_by
+from .region_heights import RegionCorners
 from .scene import Float64
 
 STEPS = 12
@@ -37,13 +38,15 @@ def least_push(
     to which a light may stand in front. report: called with the share of the steps that are done, may raise.
     """
     moved = np.zeros_like(positions)
+    report(0.0)
+    places = RegionCorners.of(regions, source_corners)
     # Always back along the normals of the start: beside an open edge, a way that turns leaves the body sideways.
     back = -_normals(positions[triangles])[0]
     for step in range(STEPS):
         report(step / STEPS)
         if step < RETREATS:
             moved *= RETREAT
-        change = _change(positions + moved, triangles, back, regions, source_corners, spared)
+        change = _change(positions + moved, triangles, back, places, spared)
         if change is None:
             break
         moved += change
@@ -51,7 +54,7 @@ def least_push(
 
 
 def _change(
-    positions: Float64, triangles: Int64, back: Float64, regions: Rows, source_corners: Float64, spared: Float64
+    positions: Float64, triangles: Int64, back: Float64, places: RegionCorners, spared: Float64
 ) -> Float64 | None:
     """(v, 3): the mean of what the lights that stand in front ask of each vertex, None where none does.
 
@@ -59,7 +62,7 @@ def _change(
     """
     corners = positions[triangles]
     normals, doubled = _normals(corners)
-    light, point, depth = _deepest_points(corners, normals, regions, source_corners)
+    light, point, depth = _deepest_points(corners, normals, places)
     asking = (depth > spared[light]) & (doubled[light] > 0)
     light, point, depth = light[asking], point[asking], depth[asking]
     if not len(light):
@@ -77,22 +80,17 @@ def _change(
     return change
 
 
-def _deepest_points(
-    corners: Float64, normals: Float64, regions: Rows, source_corners: Float64
-) -> tuple[Int64, Float64, Float64]:
+def _deepest_points(corners: Float64, normals: Float64, places: RegionCorners) -> tuple[Int64, Float64, Float64]:
     """(lights that have a region, (n, 3) its deepest corner below the plane of the light, (n,) m how deep)."""
-    owner = np.repeat(np.arange(len(corners)), regions.lengths)
-    offset = source_corners[regions.values] - corners[owner, :1]
-    height = np.einsum("ikj,ij->ik", offset, normals[owner])
-    lowest = height.min(axis=1)
-    light = np.flatnonzero(regions.lengths > 0)
+    light = np.flatnonzero(places.lengths > 0)
     if not len(light):
         return light, np.zeros((0, 3)), np.zeros(0)
+    height = places.heights(corners[:, 0], normals)
     deepest = np.zeros(len(corners))
-    deepest[light] = np.minimum.reduceat(lowest, regions.starts[:-1][light])
-    row = np.flatnonzero(lowest == deepest[owner])
-    row = row[np.unique(owner[row], return_index=True)[1]]
-    return light, source_corners[regions.values[row], height[row].argmin(axis=1)], -deepest[light]
+    deepest[light] = np.minimum.reduceat(height, places.starts[:-1][light])
+    row = np.flatnonzero(height == np.repeat(deepest, places.lengths))
+    row = row[np.searchsorted(row, places.starts[:-1][light])]
+    return light, places.coordinates[:, row].T, -deepest[light]
 
 
 def _weights(corners: Float64, normals: Float64, doubled: Float64, point: Float64) -> Float64:

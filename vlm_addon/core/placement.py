@@ -15,8 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .corner_arrays import middles
 from .least_push import least_push
 from .mesh_topology import Bool, Int64, Rows, normals_and_areas, sum_by, unit_normals, vertex_faces
+from .parallel import side_by_side, slices
+from .region_heights import heights, least_squares
 from .scene import Float64
 from .triangle_distance import flat_triangles
 from .triangle_tree import build_tree
@@ -45,6 +48,8 @@ INSETS_UNSEEN = 2.0
 STEEPEST_COSINE = 0.2
 LEAST_TURN_COSINE = 0.2
 LEAST_AREA_SHARE = 0.05
+# Pairs of a vertex and a source triangle that are looked at together.
+PAIRS_PER_BATCH = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -120,13 +125,17 @@ def intrusions(corners: Float64, regions: Rows, source_corners: Float64) -> Floa
     Negative where the plane lies behind the whole region; -inf for a light without one.
     """
     normals, _ = normals_and_areas(corners)
-    owner = np.repeat(np.arange(len(corners)), regions.lengths)
-    offset = source_corners[regions.values] - corners[owner, :1]
-    height = np.einsum("ikj,ij->ik", offset, normals[owner]).min(axis=1)
+    height = _heights(corners, normals, regions, source_corners).min(axis=0)
     deepest = np.full(len(corners), np.inf)
     filled = regions.lengths > 0
     deepest[filled] = np.minimum.reduceat(height, regions.starts[:-1][filled])
     return -deepest
+
+
+def _heights(corners: Float64, normals: Float64, regions: Rows, source_corners: Float64) -> Float64:
+    """(3, m) m: of the corners of each triangle of the regions over the plane of its light."""
+    places = source_corners.take(regions.values, axis=0).transpose(1, 2, 0)
+    return np.stack([heights(place, regions.lengths, corners[:, 0], normals) for place in places])
 
 
 def share_in_front(corners: Float64, regions: Rows, source_corners: Float64) -> float:
@@ -135,18 +144,17 @@ def share_in_front(corners: Float64, regions: Rows, source_corners: Float64) -> 
     Judged at the corners and the middle of every source triangle.
     """
     normals, _ = normals_and_areas(corners)
-    owner = np.repeat(np.arange(len(corners)), regions.lengths)
-    points = source_corners[regions.values]
-    points = np.concatenate([points, points.mean(axis=1, keepdims=True)], axis=1)
-    height = np.einsum("ikj,ij->ik", points - corners[owner, :1], normals[owner])
-    weight = normals_and_areas(source_corners[regions.values])[1]
-    behind = (height < -0.5 * insets(corners)[owner, None]).mean(axis=1)
+    height = _heights(corners, normals, regions, source_corners)
+    weight = normals_and_areas(source_corners)[1][regions.values]
+    allowed = np.repeat(-0.5 * insets(corners), regions.lengths)
+    behind = sum((each < allowed).astype(float) for each in (*height, height.mean(axis=0))) / 4.0
     return float(behind @ weight / max(weight.sum(), np.finfo(float).tiny)) if len(weight) else 0.0
 
 
 def _facing_regions(corners: Float64, regions: Rows, source_corners: Float64) -> Rows:
     owner = np.repeat(np.arange(len(corners)), regions.lengths)
-    cosine = np.einsum("ij,ij->i", unit_normals(source_corners[regions.values]), unit_normals(corners)[owner])
+    normals = unit_normals(source_corners).take(regions.values, axis=0)
+    cosine = np.einsum("ij,ij->i", normals, unit_normals(corners)[owner])
     keep = cosine > STEEPEST_COSINE
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(corners)))])
     return Rows(regions.values[keep], starts)
@@ -154,8 +162,8 @@ def _facing_regions(corners: Float64, regions: Rows, source_corners: Float64) ->
 
 def _mean_normals(regions: Rows, source_corners: Float64) -> Float64:
     """(n, 3) unit: area-weighted mean normal of each region, 0 for an empty one."""
-    corners = source_corners[regions.values]
-    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    vectors = np.cross(source_corners[:, 1] - source_corners[:, 0], source_corners[:, 2] - source_corners[:, 0])
+    vectors = vectors.take(regions.values, axis=0)
     owner = np.repeat(np.arange(len(regions.starts) - 1), regions.lengths)
     sums = np.stack([sum_by(owner, vectors[:, axis], len(regions.lengths)) for axis in range(3)], axis=1)
     length = np.linalg.norm(sums, axis=1, keepdims=True)
@@ -213,11 +221,19 @@ def _surface_points(positions: Float64, regions: Rows, source_corners: Float64, 
     points = positions.copy()
     if not len(vertex):
         return points
-    square = np.full(len(vertex), np.inf)
-    for place in (*np.moveaxis(source_corners, 1, 0), source_corners.mean(axis=1)):
-        square = np.minimum(square, ((place[triangle] - positions[vertex]) ** 2).sum(axis=1))
-    order = np.lexsort([square, vertex])
-    first = order[np.diff(vertex[order], prepend=-1) > 0]
+    place = np.stack([*np.moveaxis(source_corners, 1, 0), middles(source_corners)]).transpose(0, 2, 1).copy()
+    square = np.concatenate(
+        list(
+            side_by_side(
+                lambda rows: least_squares(place, triangle[rows], positions.T, vertex[rows]),
+                slices(len(vertex), PAIRS_PER_BATCH),
+            )
+        )
+    )
+    starts = np.flatnonzero(np.diff(vertex, prepend=-1))
+    least = np.repeat(np.minimum.reduceat(square, starts), np.diff(np.append(starts, len(vertex))))
+    row = np.flatnonzero(square == least)
+    first = row[np.searchsorted(row, starts)]
     chosen = triangle[first]
     flat = flat_triangles(source_corners[chosen])
     points[vertex[first]] = flat.nearest_points(positions[vertex[first]], np.arange(len(chosen)))

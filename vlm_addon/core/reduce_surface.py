@@ -54,6 +54,7 @@ def reduce_surface(surface: SourceSurface, target: int, report: Report = lambda 
     solid = surface.areas > LEAST_AREA * surface.diagonal**2
     if int(solid.sum()) <= target:
         return _selected(surface, solid)
+    report(0.0)
     rows = np.flatnonzero(_strongest_shells(surface, solid, target))
     weight = surface.weight() / np.where(surface.areas > 0, surface.areas, 1.0)
     begun = 0.0

@@ -109,6 +109,7 @@ def join_surface(meshes: Sequence[Mesh], report: Report = lambda share: None) ->
     edges = half_edges(welded[original], len(positions))
     report(0.45)
     cut, origin = fans_apart(welded[original], edges)
+    report(0.65)
     unlit_area = float(normals_and_areas(positions[unlit])[1].sum())
     positions, mesh_of = positions[origin], mesh_of[original]
     normals, areas = normals_and_areas(positions.take(cut, axis=0))

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .corner_arrays import highest, lowest, middles
 from .light_mesh import VirtualLightMesh
 from .mesh_topology import Bool, Int64, closed_shells, unit_normals, weld
 from .nearest_lights import light_of_triangles
@@ -96,7 +97,7 @@ def thin_against(
     bulge = np.where(high > low, high - low, 0.0)
     looked_at = bulge[light] > 2.0 * insets(light_corners)[light]
     rows, light = rows[looked_at], light[looked_at]
-    middle = corners[rows].mean(axis=1)
+    middle = middles(corners[rows])
     reach = normals[rows] * (bulge[light] / THICKNESS_SHARE)[:, None]
     thin = np.zeros(len(corners), bool)
     thin[rows] = np.isfinite(tree.first_hits(middle, middle - reach, True, report))
@@ -152,10 +153,11 @@ def two_sided(
 
 def _extents(corners: Float64, region: Int64, count: int) -> Float64:
     """(count,) m: diagonal of the box of each region's triangles."""
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, region, corners.min(axis=1))
-    np.maximum.at(high, region, corners.max(axis=1))
-    extents: Float64 = np.linalg.norm(high - low, axis=1)
+    low, high = np.full((3, count), np.inf), np.full((3, count), -np.inf)
+    for axis, (least, most) in enumerate(zip(lowest(corners).T, highest(corners).T, strict=True)):
+        np.minimum.at(low[axis], region, least)
+        np.maximum.at(high[axis], region, most)
+    extents: Float64 = np.linalg.norm(high - low, axis=0)
     return extents
 
 
@@ -163,11 +165,10 @@ def _met_sides(
     points: Float64, directions: Float64, gap: Float64, tree: TriangleTree, report: Report
 ) -> tuple[Bool, Bool]:
     """((r,) whether each ray from just off `points` first meets a front farther off than the gap, or else anything)."""
-    corners = tree.corners
-    diagonal = float(np.linalg.norm(corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))))
+    diagonal = tree.diagonal
     start = points + START_SHARE * diagonal * directions
     met, fraction = tree.first_met_at(start, points + diagonal * directions, report=report)
-    facing = np.einsum("ij,ij->i", unit_normals(corners[met]), directions) < 0
+    facing = np.einsum("ij,ij->i", unit_normals(tree.corners[met]), directions) < 0
     front: Bool = (met >= 0) & facing & (fraction * diagonal > gap)
     return front, (met >= 0) & ~front
 

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from ..extraction import kept_materials
-from . import draw_keys, draw_preview
+from . import draw_ahead, draw_keys, draw_preview
 
 MODES = {"OBJECT": "object", "EDIT_MESH": "edit_mesh"}
 
@@ -84,6 +84,7 @@ def tool_name(tool: Tool, mode: str) -> str:
 def register(undo: ExitStack) -> None:
     """Add keys and tools; `undo` hears how to take them out."""
     draw_preview.register(undo)
+    draw_ahead.register(undo)
     kept_materials.register(undo)
     draw_keys.register_keys(undo)
     classes = tool_classes()
@@ -100,6 +101,9 @@ def _tool_class(tool: Tool, mode: str) -> type:
         for name in tool.options:
             layout.prop(properties, name)
 
+    def draw_cursor(context: Any, workspace_tool: Any, place: tuple[float, float]) -> None:
+        draw_ahead.mouse_is_at(context, *place)
+
     members = {
         "bl_space_type": "VIEW_3D",
         "bl_context_mode": mode,
@@ -110,5 +114,6 @@ def _tool_class(tool: Tool, mode: str) -> type:
         "bl_cursor": "CROSSHAIR",
         "bl_keymap": ((tool.operator, {"type": "LEFTMOUSE", "value": "PRESS"}, None),),
         "draw_settings": staticmethod(draw_settings),
+        "draw_cursor": staticmethod(draw_cursor),
     }
     return type(f"VLM_WST_{tool.name}_{MODES[mode]}", (bpy.types.WorkSpaceTool,), members)

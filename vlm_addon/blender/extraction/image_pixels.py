@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...core.parallel import slices
 from ...core.scene import Float32, Float64
 from .color_space import into_rec709, srgb_to_linear
 
@@ -16,6 +16,8 @@ from .color_space import into_rec709, srgb_to_linear
 MISSING_COLOR = (1.0, 0.0, 1.0, 1.0)
 RAW_SPACES = ("Non-Color", "Raw", "Generic Data")
 LINEAR_REC709_SPACES = ("Linear Rec.709", "Linear")
+# Rows of a picture that stay within a cache.
+ROWS_AT_ONCE = 64
 
 
 def image_pixels(
@@ -45,7 +47,7 @@ def image_pixels(
         report(f"image {image.name!r} is in color space {space!r}", "read as sRGB")
     levels = np.linspace(0.0, 1.0, 256, dtype=np.float32)
     decode = levels if space in (*RAW_SPACES, *LINEAR_REC709_SPACES) else srgb_to_linear(levels)
-    return _byte_pixels(np.rint(pixels * 255.0).astype(np.uint8), image, straight_alpha, decode)
+    return _byte_pixels(pixels, image, straight_alpha, decode)
 
 
 def _four_channels(stored: Float32) -> Float32:
@@ -73,17 +75,19 @@ def _float_pixels(pixels: Float32, image: Any, straight: bool, to_rec709: Float6
     return pixels
 
 
-def _byte_pixels(stored: npt.NDArray[np.uint8], image: Any, straight: bool, decode: Float32) -> Float32:
+def _byte_pixels(pixels: Float32, image: Any, straight: bool, decode: Float32) -> Float32:
     """Blender keeps the alpha of byte images straight. Cycles multiplies encoded bytes, and cuts off what is left."""
-    if _has_no_alpha(image):
-        stored[..., 3] = 255
-    elif image.alpha_mode != "CHANNEL_PACKED" and not straight:
-        product = stored[..., :3].astype(np.uint16) * stored[..., 3:]
-        stored[..., :3] = product // 255
-    pixels = np.empty(stored.shape, np.float32)
-    pixels[..., :3] = decode[stored[..., :3]]
-    pixels[..., 3] = stored[..., 3] / np.float32(255.0)
-    return pixels
+    result = np.empty(pixels.shape, np.float32)
+    for part in slices(len(pixels), ROWS_AT_ONCE):
+        stored = (pixels[part] * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+        if _has_no_alpha(image):
+            stored[..., 3] = 255
+        elif image.alpha_mode != "CHANNEL_PACKED" and not straight:
+            product = stored[..., :3].astype(np.uint16) * stored[..., 3:]
+            stored[..., :3] = product // 255
+        decode.take(stored, out=result[part], mode="clip")
+        result[part, ..., 3] = stored[..., 3] / np.float32(255.0)
+    return result
 
 
 def _has_no_alpha(image: Any) -> bool:

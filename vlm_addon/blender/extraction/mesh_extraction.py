@@ -143,6 +143,14 @@ class MeshExtractor:
         look = self._new_look(local, self._uses(blender_object), blender_object.name)
         return look.reflectance, look.emission
 
+    def read_material(self, material: Any | None) -> None:
+        """Read a material with its pictures before it is needed."""
+        self._materials.use(material)
+
+    def halve_pictures(self) -> None:
+        """Make the smaller pictures of all that was read; may be called in a thread."""
+        self._averager.halve_all()
+
     def _uses(self, blender_object: Any) -> tuple[MaterialUse, ...]:
         if self._override is not None:
             return (self._materials.use(self._override),)

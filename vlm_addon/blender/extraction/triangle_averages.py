@@ -59,6 +59,15 @@ class TextureAverager:
             result[chosen] = _bilinear(self._picture(index, int(level)), points[chosen], self._textures[index].repeat)
         return result
 
+    def halve_all(self) -> None:
+        """Make all halved pictures before they are needed; may be called in a thread."""
+        for index in range(len(self._textures)):
+            if index not in self._levels:
+                pictures = [self._textures[index].pixels]
+                while max(pictures[-1].shape[:2]) > 1:
+                    pictures.append(_halved(pictures[-1]))
+                self._levels.setdefault(index, pictures)
+
     def _picture(self, index: int, level: int) -> Float32:
         pictures = self._levels.setdefault(index, [self._textures[index].pixels])
         while len(pictures) <= level and max(pictures[-1].shape[:2]) > 1:
@@ -68,7 +77,8 @@ class TextureAverager:
 
 def _halved(picture: Float32) -> Float32:
     height, width = picture.shape[:2]
-    padded = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    odd = height % 2 or width % 2
+    padded = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge") if odd else picture
     rows = 0.5 * (padded[0::2] + padded[1::2])
     return (0.5 * (rows[:, 0::2] + rows[:, 1::2])).astype(np.float32)
 
