@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from vlm_addon.blender.overlays import overlays
+from vlm_addon.blender.overlays import overlay_drawing, overlays
 from vlm_addon.blender.overlays.overlay_drawing import OverlayDrawing
 from vlm_addon.blender.overlays.overlay_shapes import (
     COLOR,
@@ -220,3 +220,21 @@ def test_a_light_under_a_bulge_comes_out_in_its_middle(make_mesh, make_plane):
     bpy.context.view_layer.update()
     (depth,) = depths_below(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), faces_of(thing))
     assert depth == pytest.approx(0.2 * (1.0 - 1.0 / 3.0), rel=1e-4), "over the middle of the light"
+
+
+def test_depths_are_looked_for_again_where_lights_moved_and_not_where_their_colours_changed(make_lights, monkeypatch):
+    thing = make_lights(vlm_color=[[0.5, 0.25, 0.0, 1.0], [0.1, 7.5, 0.2, 1.0]])
+    asked = []
+    monkeypatch.setattr(overlay_drawing, "depths_below", lambda *rest: asked.append(rest) or np.zeros(3))
+    drawing = OverlayDrawing()
+
+    def look():
+        drawing._depths_below(thing, bpy.context.scene, None, faces_of(thing))
+        return len(asked)
+
+    assert [look(), look()] == [1, 1]
+    thing.data.attributes["vlm_color"].data[0].color = (1.0, 1.0, 1.0, 1.0)
+    assert look() == 1
+    thing.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert look() == 2

@@ -15,6 +15,7 @@ from ...core.errors import VlmError
 from ...core.grid_samples import Cells, GridView, cells_around, look, slice_cells
 from ...core.light_grid import RANGE
 from ...core.scene import Float64
+from ..light_geometry import LightFaces
 from ..light_grid_options import scene_grid_settings
 from ..light_meshes import light_meshes
 from ..names import HUE_PROPERTY, STRENGTH_PROPERTY, TAG_PROPERTY, is_light_mesh
@@ -66,6 +67,7 @@ class OverlayDrawing:
         self._painter = Painter()
         self._parts: dict[str, _Part] = {}
         self._changes: dict[tuple[str, str], int] = {}
+        self._depths: dict[str, tuple[Float64, Float64]] = {}
         self._surface_changes = 0
         self._grids: dict[str, GridView] = {}
         self._cells: tuple[Any, Cells] | None = None
@@ -82,6 +84,7 @@ class OverlayDrawing:
             bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
         self._handles = []
         self._painter = Painter()
+        self._depths.clear()
         self.forget()
 
     def forget(self, with_grids: bool = False) -> None:
@@ -181,7 +184,7 @@ class OverlayDrawing:
 
         def shapes() -> list[Shape]:
             faces = world_faces(thing, depsgraph)
-            nearer = STEEPNESS * depths_below(scene, depsgraph, faces)
+            nearer = STEEPNESS * self._depths_below(thing, scene, depsgraph, faces)
             fill, alpha = settings.fill, settings.opacity
             found = [fill_shape(thing, faces, fill, alpha, nearer)] if fill != NONE else []
             if settings.sides:
@@ -193,6 +196,15 @@ class OverlayDrawing:
             return found
 
         return self._part(thing.name, key, shapes)
+
+    def _depths_below(self, thing: Any, scene: Any, depsgraph: Any, faces: LightFaces) -> Float64:
+        """`depths_below`, kept while the lights stay where they are, and while they are dragged about in Edit Mode."""
+        corners, depths = self._depths.get(thing.name, (np.zeros(0), np.zeros(0)))
+        is_kept = corners.shape == faces.corners.shape
+        if not is_kept or (thing.mode != "EDIT" and not np.array_equal(corners, faces.corners)):
+            depths = depths_below(scene, depsgraph, faces)
+            self._depths[thing.name] = faces.corners, depths
+        return depths
 
     def _surface_key(self, scene: Any) -> Any:
         tags = tuple(
