@@ -57,7 +57,7 @@ class LongOperator(Generic[T]):
         raise NotImplementedError
 
     def keep_what_is_written(self) -> None:
-        """Say that a step has written something: what fails from now on leaves an undo step."""
+        """Say that a step before the last has written something: what fails from now on leaves an undo step."""
         self._has_written = True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -74,7 +74,6 @@ class LongOperator(Generic[T]):
             work: Callable[[Progress], T] | None = self.prepare(context)
             while work is not None:
                 work = self.finish(context, work(progress))
-                self._has_written = True
         except VlmError as error:
             return self._failed(error)
         finally:
@@ -98,7 +97,18 @@ class LongOperator(Generic[T]):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Show progress, cancel on Esc, finish when the work has ended; all other events stay Blender's."""
+        """Show progress, cancel on Esc, finish when the work has ended; all other events stay Blender's.
+
+        Whatever ends the operator, an error that nobody foresaw as well, takes its timer, bar and texts away.
+        """
+        with ExitStack() as undo:
+            undo.callback(self._clean_up, context)
+            result = self._handled(context, event)
+            if result & {"RUNNING_MODAL", "PASS_THROUGH"}:
+                undo.pop_all()
+        return result
+
+    def _handled(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "ESC" and event.value == "PRESS":
             self._work.cancel()
             return {"RUNNING_MODAL"}
@@ -108,14 +118,11 @@ class LongOperator(Generic[T]):
         try:
             more = self.finish(context, self._work.result())
         except VlmError as error:
-            self._clean_up(context)
             return self._failed(error)
-        self._has_written = True
-        if more is not None:
-            self._work = BackgroundWork(more)
-            return {"RUNNING_MODAL"}
-        self._clean_up(context)
-        return {"FINISHED"}
+        if more is None:
+            return {"FINISHED"}
+        self._work = BackgroundWork(more)
+        return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator: another file is loaded or the window closes."""
