@@ -10,7 +10,6 @@ import bpy
 from window_steps import (
     LONGEST_WAIT_SECONDS,
     SECONDS_FOR_AN_EVENT,
-    SECONDS_FOR_REDRAW,
     comes_true,
     in_view,
     move,
@@ -30,6 +29,7 @@ SMALLER = 0.8
 """Scale of the interface, so that the whole sidebar fits on the screen."""
 CLOSED_PIXELS = 40
 """Height under which the panel Adjust Last Operation shows its title alone."""
+TURNS = 3
 TIMES_DRAWN = 5
 """How often a panel is drawn, at most, until its new size shows."""
 SECONDS_TO_START = 3.0
@@ -76,10 +76,14 @@ def rows_of_sidebar():
     return range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -STEP_PIXELS)
 
 
-def asked(place, seconds=0.0):
-    """Yields until the mouse is there; the command of our button under it, or None."""
+def asked(place):
+    """Yields until the mouse is there; the command of our button under it, or None.
+
+    The button that the mouse leaves lets go of it in one turn of Blender's, and the next one hears of it in another.
+    """
     move(place)
-    yield seconds
+    for _ in range(TURNS):
+        yield 0.0
     return command_under_mouse()
 
 
@@ -108,17 +112,15 @@ def find_button(name, arguments=""):
     def is_wanted(command):
         return command is not None and command[0] == name and arguments in command[1]
 
-    # A move may take Blender longer than one turn: the answer then is about the place before. So it is asked again.
-    for seconds in (0.0, SECONDS_FOR_AN_EVENT):
-        for y in sorted(rows_of_sidebar(), key=lambda each: abs(each - last[1])):
-            for column in (LEFT, RIGHT):
-                place = (sidebar.x + int(sidebar.width * column), y)
-                command = yield from asked(place, seconds)
-                if is_wanted(command) and is_wanted((yield from asked(place, SECONDS_FOR_REDRAW))):
-                    PLACES[name] = place
-                    return place
-                if command is None:
-                    break
+    for y in sorted(rows_of_sidebar(), key=lambda each: abs(each - last[1])):
+        for column in (LEFT, RIGHT):
+            place = (sidebar.x + int(sidebar.width * column), y)
+            command = yield from asked(place)
+            if is_wanted(command) and is_wanted((yield from asked(place))):
+                PLACES[name] = place
+                return place
+            if command is None:
+                break
     return None
 
 
