@@ -26,7 +26,9 @@ def side_by_side(
     Whoever stops asking, or raises in between, waits for the few parts that are under way. report: called with the
     share of the parts that are done, may raise.
     """
-    for number, result in enumerate(_in_order(work, parts)):
+    # To start threads takes longer than a small part.
+    results = _in_order(work, parts) if len(parts) > 1 else map(work, parts)
+    for number, result in enumerate(results):
         report((number + 1) / len(parts))
         yield result
 
