@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import finding_kinds as kinds
+from .counting import counted_verb
 from .light_links import leaves_out
 from .light_marks import LightHistory
 from .light_mesh import VirtualLightMesh
@@ -67,6 +68,7 @@ def check_light_mesh(
     marks = None if history is None else history.marks
     found = [*_degenerate(light_mesh), *_joints(light_mesh, marks, between(report, NEAREST_TIME, JOINTS_TIME))]
     found += _source_findings(light_mesh, surface, between(report, JOINTS_TIME, 1.0))
+    report(1.0)
     return (*found, *_bright(light_mesh), *_lost_tags(light_mesh, meshes))
 
 
@@ -185,8 +187,7 @@ def _append(found: list[Finding], bad: Bool, values: Rows, problem: str, remedy:
     if bad.any():
         first = int(np.argmax(bad))
         shown = np.array2string(np.asarray(values[first]), precision=4, separator=", ")
-        lights = "1 light has" if bad.sum() == 1 else f"{int(bad.sum())} lights have"
-        problem = f"{lights} {problem} (first: light {first}, {shown})"
+        problem = f"{_lights(bad, 'has', 'have')} {problem} (first: light {first}, {shown})"
         found.append(Finding(SUBJECT, problem, remedy, kind, _rows(np.flatnonzero(bad))))
 
 
@@ -210,16 +211,15 @@ def _joints(light_mesh: VirtualLightMesh, marks: Int32 | None, report: Report) -
     found: list[Finding] = []
     crossed = badly_joined(light_mesh)
     if crossed.any():
-        lights = "1 light faces" if crossed.sum() == 1 else f"{int(crossed.sum())} lights face"
-        problem = f"{lights} against the lights beside (first: light {int(np.argmax(crossed))})"
+        problem = (
+            f"{_lights(crossed, 'faces', 'face')} against the lights beside (first: light {int(np.argmax(crossed))})"
+        )
         remedy = "flip them, so that all of a surface shine to one side"
         found.append(Finding(SUBJECT, problem, remedy, kinds.NON_MANIFOLD, _rows(np.flatnonzero(crossed))))
     twice = covered_twice(light_mesh, report, marks)
     if twice.any():
-        lights = "1 light lies" if twice.sum() == 1 else f"{int(twice.sum())} lights lie"
-        problem = (
-            f"{lights} on others that face alike, so its bounce counts twice (first: light {int(np.argmax(twice))})"
-        )
+        lights, count = _lights(twice, "lies", "lie"), "counts" if twice.sum() == 1 else "count"
+        problem = f"{lights} on others that face alike and {count} twice (first: light {int(np.argmax(twice))})"
         found.append(Finding(SUBJECT, problem, "delete them", kinds.OVERLAPPING, _rows(np.flatnonzero(twice))))
     return found
 
@@ -284,14 +284,17 @@ def _depth_findings(share: Float64, depth: Float64, surface: _Surface, report: R
         problem = f"{_stand(thin)} in front of a body that is too thin to hide behind {_worst(thin, share, depth)}"
         found.append(Finding(SUBJECT, problem, remedy, kinds.THIN, _rows(np.flatnonzero(thin))))
     if seen.any():
-        which = "1 light stands" if seen.sum() == 1 else f"{int(seen.sum())} lights stand"
-        problem = f"{which} for a sheet that is seen from behind, too (first: light {int(np.argmax(seen))})"
+        problem = f"{_stand(seen)} for a sheet that is seen from behind, too (first: light {int(np.argmax(seen))})"
         found.append(Finding(SUBJECT, problem, remedy, kinds.TWO_SIDED, _rows(np.flatnonzero(seen))))
     return found
 
 
+def _lights(chosen: Bool, one: str, more: str) -> str:
+    return counted_verb(int(chosen.sum()), "light", one, more)
+
+
 def _stand(chosen: Bool) -> str:
-    return "1 light stands" if chosen.sum() == 1 else f"{int(chosen.sum())} lights stand"
+    return _lights(chosen, "stands", "stand")
 
 
 def _worst(chosen: Bool, share: Float64, depth: Float64) -> str:
