@@ -83,7 +83,8 @@ def test_a_renamed_source_is_found(cube_lights):
 
 def test_what_cannot_be_made_again_says_why(cube_lights, make_plane):
     bpy.data.objects.remove(bpy.data.objects["Cube"])
-    assert create_again.again_problem(bpy.context) == "All that VLM was made from is gone: undo, or create another light mesh"
+    told = "All that VLM was made from is gone: undo, or create another light mesh"
+    assert create_again.again_problem(bpy.context) == told
     bpy.context.view_layer.objects.active = make_plane()
     assert create_again.again_problem(bpy.context) == "Select the light mesh that is to be made again"
 

@@ -192,4 +192,4 @@ def test_a_tag_that_a_link_uses_is_not_lost() -> None:
 
 def test_many_bad_lights_give_one_line() -> None:
     light_mesh = create_light_mesh([mesh_of(*grid(60, 60))], SimplifySettings(10_000)).light_mesh
-    assert "7200 lights have a negative color" in only_problem(replace(light_mesh, colour=light_mesh.colour - 1))
+    assert "7,200 lights have a negative color" in only_problem(replace(light_mesh, colour=light_mesh.colour - 1))

@@ -68,13 +68,15 @@ def factors(thing: Any, broken: bool = False) -> tuple[float, Float64]:
     broken: whether they may be negative or no numbers, for the check to find. Raises InvalidInput.
     """
     strength, hue = _floats(thing, STRENGTH_PROPERTY, 1.0), _floats(thing, HUE_PROPERTY, (1.0, 1.0, 1.0))
-    wanted = "a number of at least 0"
-    if strength is None or strength.ndim or not (broken or 0.0 <= strength < np.inf):
-        raise wrong_value(thing, STRENGTH_PROPERTY, wanted)
+    if strength is None or strength.ndim:
+        raise wrong_value(thing, STRENGTH_PROPERTY, "a number")
     if hue is None or hue.ndim != 1 or len(hue) not in CHANNELS:
         raise wrong_value(thing, HUE_PROPERTY, "three numbers")
-    if not (broken or ((hue >= 0.0) & (hue < np.inf)).all()):
-        raise wrong_value(thing, HUE_PROPERTY, "three numbers of at least 0")
+    for name, values in () if broken else ((STRENGTH_PROPERTY, strength), (HUE_PROPERTY, hue)):
+        if not np.isfinite(values).all():
+            raise wrong_value(thing, name, "of use: it is not finite")
+        if (values < 0.0).any():
+            raise wrong_value(thing, name, "of use: it is negative")
     return float(strength), hue[: CHANNELS[0]]
 
 

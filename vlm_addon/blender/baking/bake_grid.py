@@ -49,7 +49,7 @@ def bake_problem(context: Any) -> str | None:
 def clear_problem(context: Any) -> str | None:
     """Why there is no baked data to remove, or None."""
     if context.scene.library is not None:
-        return f"The scene is linked from {context.scene.library.filepath}: open that file, its baked data belongs to it"
+        return f"The scene is linked from {context.scene.library.filepath}: open it, the baked data is its own"
     if not bake_store.grid_path(context.scene).is_file():
         return "No light grid is baked for this scene: Bake Light Grid makes one"
     return None

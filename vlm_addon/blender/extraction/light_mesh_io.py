@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...core.counting import counted
 from ...core.errors import InvalidInput
 from ...core.light_mesh import VirtualLightMesh, empty_light_mesh, join, require_valid
 from ...core.scene import Float32, Float64, Int32, SceneSnapshot
@@ -152,8 +153,9 @@ def _with_source_points(
     light_mesh = join([each.lights for each in lights])
     samples, missed = find_source_points(light_mesh, snapshot.meshes, options.samples_per_light)
     if missed:
-        problem = f"{missed} of {len(light_mesh)} lights have no visible surface in front of them"
-        report("light mesh", problem, "the light on them is measured at the lights themselves")
+        verb = "has" if missed == 1 else "have"
+        problem = f"{missed:,} of {counted(len(light_mesh), 'light')} {verb} no visible surface in front"
+        report("light mesh", problem, "the light there is measured at the lights themselves")
     found = replace(light_mesh, samples=samples)
     if not broken_values:
         require_valid(found)
