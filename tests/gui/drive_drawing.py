@@ -87,20 +87,29 @@ def made(name, before):
 
 
 def trace():
-    """Time the callbacks of strokes, by event: wall clock, and processor time of the thread."""
+    """Time the callbacks of strokes, by event, and what is made ready ahead of them: wall clock, and processor time of
+    the thread."""
+    ahead = sys.modules[f"{MODULE}.vlm_addon.blender.drawing.draw_ahead"]
+    ahead._step = timed_call(ahead._step, lambda *_: f"{STORY.get('part', '')}: ahead")
     stroke = sys.modules[f"{MODULE}.vlm_addon.blender.drawing.draw_modal"].ModalStroke
-    handled = stroke._handled
+    stroke._handled = timed_call(
+        stroke._handled,
+        lambda self, _, event: f"{STORY.get('part', '')}: {type(self).__name__} {event.type} {event.value}",
+    )
 
-    def timed(self, context, event):
+
+def timed_call(function, name_of):
+    """`function`, whose times are kept under the name that its arguments give."""
+
+    def timed(*values):
         wall, busy = time.perf_counter(), time.thread_time()
         try:
-            return handled(self, context, event)
+            return function(*values)
         finally:
             spent = (1000.0 * (time.perf_counter() - wall), 1000.0 * (time.thread_time() - busy))
-            name = f"{STORY.get('part', '')}: {type(self).__name__} {event.type} {event.value}"
-            STORY["milliseconds"].setdefault(name, []).append([round(value, 2) for value in spent])
+            STORY["milliseconds"].setdefault(name_of(*values), []).append([round(value, 2) for value in spent])
 
-    stroke._handled = timed
+    return timed
 
 
 def open_box():
@@ -228,6 +237,9 @@ def heavy():
     tool("polygon_object")
     yield 3 * SECONDS_FOR_REDRAW
     x, y = at((0.0, 0.0, 0.0))
+    STORY["part"] = "262k triangles"
+    move((x, y))
+    yield 4 * SECONDS_FOR_REDRAW
     for number in range(5):
         STORY["part"] = f"262k triangles, stroke {number + 1}"
         left, low = x - 150 + 50 * number, y - 60 + 25 * number

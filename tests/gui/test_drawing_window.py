@@ -86,3 +86,7 @@ def test_the_header_tells_of_a_stroke_and_is_blenders_again_after_it(story):
     amid, after, later = (pixels(story["folder"] / f"{name}.png")[56:78, 8:250] for name in names)
     assert not np.array_equal(amid, after)
     assert np.array_equal(after, later)
+
+
+def test_a_surface_is_made_ready_while_the_mouse_rests_over_it(story):
+    assert len(story["milliseconds"]["262k triangles: ahead"]) > 1
