@@ -71,6 +71,29 @@ def test_a_file_that_was_never_saved_keeps_its_bake_until_it_is_and_takes_it_alo
     assert changes() == ()
 
 
+def test_a_bake_that_cannot_be_written_beside_the_first_save_is_kept_told_and_taken_along_by_the_next(room, tmp_path):
+    unsaved = bake()
+    (tmp_path / "full.vlm").write_text("in the way")
+    save(tmp_path / "full.blend")
+    assert unsaved.is_file()
+    assert (state(), bake_state.badge(bpy.context).text) == (bake_state.OLD, bake_state.NOT_TAKEN_ALONG)
+    save(tmp_path / "room.blend")
+    assert not unsaved.exists()
+    assert bake_store.grid_path(room).is_file()
+    assert changes() == ()
+    assert state() == bake_state.CURRENT
+
+
+def test_baking_again_ends_what_is_said_of_a_bake_that_could_not_be_written(room, tmp_path):
+    bake()
+    (tmp_path / "room.vlm").write_text("in the way")
+    save(tmp_path / "room.blend")
+    (tmp_path / "room.vlm").unlink()
+    bake()
+    assert changes() == ()
+    assert state() == bake_state.CURRENT
+
+
 def test_saving_under_another_name_takes_the_bake_along(room, tmp_path):
     save(tmp_path / "one.blend")
     bake()
@@ -149,6 +172,12 @@ def test_a_grid_whose_bake_was_interrupted_does_not_count(room, tmp_path):
     save(tmp_path / "room.blend")
     bake().with_suffix(".json").unlink()
     assert bake_store.stored_key(room) is None
+    assert bake_state.badge(bpy.context).text == bake_state.NOT_BAKED_TO_END
+    assert changes() == ("light grid: it was not baked to its end",)
+    assert state() == bake_state.OLD
+    bake_grid.clear(bpy.context)
+    assert changes() == ()
+    assert state() == bake_state.CURRENT
 
 
 def test_a_broken_key_is_told(room, tmp_path):
@@ -193,6 +222,15 @@ def recolor(thing):
         material.use_nodes = True
     material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.1, 0.2, 0.9, 1.0)
     thing.data.materials.append(material)
+
+
+def textured(thing, image):
+    recolor(thing)
+    tree = bpy.data.materials["new"].node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.links.new(texture.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    bpy.context.view_layer.update()
 
 
 def delete(thing):
@@ -279,6 +317,20 @@ def test_what_blender_tells_no_change_of_is_noticed(room, change):
         bpy.context.view_layer.layer_collection.children["Apart"].exclude = True
         bpy.context.view_layer.update()
     assert state() == bake_state.UNKNOWN
+
+
+def test_a_painted_picture_of_a_source_is_suspected(make_cube):
+    picture = bpy.data.images.new("Painted", 4, 4)
+    textured(make_cube("Box"), picture)
+    select("Box")
+    authoring.write(authoring.from_selection(bpy.context, FEW)(silent))
+    assert changes() == ()
+    assert state() == bake_state.CURRENT
+    picture.pixels[:] = [1.0] * 64
+    picture.update_tag()
+    bpy.context.view_layer.update()
+    assert state() == bake_state.UNKNOWN
+    assert changes() == ("VLM Box: 'Box' changed",)
 
 
 def test_what_is_animated_is_up_to_date_in_every_frame(room):

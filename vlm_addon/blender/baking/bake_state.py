@@ -39,6 +39,8 @@ STAMPED = (LINKS_PROPERTY, DYNAMIC_PROPERTY)
 """Custom properties of light meshes that a baked grid depends on."""
 
 NONE, CURRENT, UNKNOWN, OLD = "NONE", "CURRENT", "UNKNOWN", "OLD"
+NOT_TAKEN_ALONG = "The light grid could not be written beside the file: save elsewhere, or bake again"
+NOT_BAKED_TO_END = "The light grid was not baked to its end: bake it again"
 ICONS = {NONE: "RADIOBUT_OFF", CURRENT: "CHECKMARK", UNKNOWN: "QUESTION", OLD: "ERROR"}
 
 
@@ -64,15 +66,19 @@ class VLM_PG_bake(bpy.types.PropertyGroup):  # noqa: N801 (Blender's naming of c
     changes: bpy.props.StringProperty(name="What is out of date")  # type: ignore[valid-type]
     stamp: bpy.props.StringProperty(name="What Blender tells no changes of")  # type: ignore[valid-type]
     folder: bpy.props.StringProperty(name="Folder of baked data before a save")  # type: ignore[valid-type]
+    left: bpy.props.StringProperty(name="Scenes whose baked data did not go along")  # type: ignore[valid-type]
 
 
 def badge(context: Any) -> Badge:
     """For a panel: quick, reads no geometry."""
-    scene = context.scene
-    has_grid = bake_store.grid_path(scene).is_file()
+    scene, known = context.scene, _state(context)
+    has_grid = bake_store.has_grid(scene)
+    if scene.name in known.left.split("\n"):
+        return Badge(OLD, NOT_TAKEN_ALONG)
+    if bake_store.is_interrupted(scene):
+        return Badge(OLD, NOT_BAKED_TO_END)
     if not has_grid and not any(MADE_FROM_PROPERTY in thing for thing in light_meshes(scene)):
         return Badge(NONE, "Nothing is baked")
-    known = _state(context)
     if not known.looked or known.scene != scene.name:
         subject = "Light grid baked" if has_grid else "Light mesh made"
         return Badge(UNKNOWN, f"{subject} earlier: compare to see whether it is up to date")
@@ -108,6 +114,8 @@ def compare(context: Any) -> tuple[str, ...]:
     elif stored is not None and found.light_mesh is not None:
         now = grid_key(found.snapshot.meshes, found.light_mesh, settings)
         changes += [f"light grid: {phrase}" for phrase in grid_changes(stored, now)]
+    if bake_store.is_interrupted(scene):
+        changes.append("light grid: it was not baked to its end")
     remember(context, changes)
     return tuple(changes)
 
@@ -158,7 +166,7 @@ def remember(context: Any, changes: list[str] | tuple[str, ...]) -> None:
 def forget(context: Any) -> None:
     """Whether baked data is up to date is not known."""
     known = _state(context)
-    known.looked, known.touched, known.changes = False, False, ""
+    known.looked, known.touched, known.changes, known.left = False, False, "", ""
 
 
 def _stamp(context: Any) -> str:
@@ -181,6 +189,8 @@ def _counts(update: Any) -> bool:
     if isinstance(identity, bpy.types.Object):
         moved = update.is_updated_geometry or update.is_updated_transform
         return moved and (identity.type in GEOMETRY_TYPES or identity.is_instancer)
+    if isinstance(identity, bpy.types.Image):
+        return identity.source != "VIEWER"  # pictures that Blender renders
     if isinstance(identity, bpy.types.Material):
         return bool(update.is_updated_shading)
     return isinstance(identity, bpy.types.Scene) and update.is_updated_geometry
@@ -208,14 +218,17 @@ def _after_load(*_: Any) -> None:
 
 @persistent
 def _before_save(*_: Any) -> None:
-    _state(bpy.context).folder = str(bake_store.folder_beside(bpy.data.filepath))
+    known = _state(bpy.context)
+    if not known.left:  # what did not go along is tried again from where it is
+        known.folder = str(bake_store.folder_beside(bpy.data.filepath))
 
 
 @persistent
 def _after_save(path: str, *_: Any) -> None:
     # A copy that is saved elsewhere is another program's or a backup; the open file goes on where it is.
     if Path(path) == Path(bpy.data.filepath):
-        bake_store.take_along(Path(_state(bpy.context).folder), path)
+        known = _state(bpy.context)
+        known.left = "\n".join(bake_store.take_along(Path(known.folder), path))
 
 
 def register(undo: ExitStack) -> None:

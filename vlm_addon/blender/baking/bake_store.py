@@ -74,12 +74,23 @@ def store(scene: Any, grid: LightGrid, key: BakeKey, visibility: BakedVisibility
     return path
 
 
+def has_grid(scene: Any) -> bool:
+    """Whether a light grid of `scene` is stored, with what it depends on."""
+    path = grid_path(scene)
+    return path.is_file() and path.with_suffix(KEY_SUFFIX).is_file()
+
+
+def is_interrupted(scene: Any) -> bool:
+    """Whether a light grid is stored without what it depends on, or the other way round: it does not count."""
+    path = grid_path(scene)
+    return path.is_file() != path.with_suffix(KEY_SUFFIX).is_file()
+
+
 def stored_key(scene: Any) -> BakeKey | None:
     """What the light grid of `scene` was baked from, None where there is none. Raises InvalidInput for a broken one."""
-    path = grid_path(scene)
-    told = path.with_suffix(KEY_SUFFIX)
-    if not path.is_file() or not told.is_file():
+    if not has_grid(scene):
         return None
+    told = grid_path(scene).with_suffix(KEY_SUFFIX)
     try:
         tree = json.loads(told.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -105,22 +116,24 @@ def clear_unsaved() -> None:
     shutil.rmtree(folder_beside(""), ignore_errors=True)
 
 
-def take_along(before: Path, blend: str) -> int:
+def take_along(before: Path, blend: str) -> tuple[str, ...]:
     """Copy the baked data of the open file's scenes from the folder `before` to that of `blend`, saved just now.
 
-    What was never saved is moved. Returns how many grids arrived; those that cannot be written are left out.
+    What was never saved is moved, once all of it has arrived. Returns the names of scenes whose grid could not be
+    written: it is where it was. A grid without its key does not count and stays behind.
     """
     after = folder_beside(blend)
     if before == after or not before.is_dir():
-        return 0
-    arrived = 0
+        return ()
+    left = []
     for scene in bpy.data.scenes:
-        name = grid_path(scene).name
-        if scene.library is None and (before / name).is_file():
-            arrived += _copy(before / name, after)
-    if before == folder_beside(""):
+        path = before / grid_path(scene).name
+        whole = path.is_file() and path.with_suffix(KEY_SUFFIX).is_file()
+        if scene.library is None and whole and not _copy(path, after):
+            left.append(scene.name)
+    if before == folder_beside("") and not left:
         clear_unsaved()
-    return arrived
+    return tuple(left)
 
 
 def _copy(path: Path, folder: Path) -> bool:

@@ -365,6 +365,12 @@ SENTENCES = {
         "Die Szene wurde geändert: Das Gebackene ist vielleicht veraltet"
     ),
     "Out of date:": "Veraltet:",
+    "The light grid could not be written beside the file: save elsewhere, or bake again": (
+        "Das Lichtgitter konnte nicht neben die Datei geschrieben werden: woanders speichern oder neu backen"
+    ),
+    "The light grid was not baked to its end: bake it again": (
+        "Das Lichtgitter wurde nicht zu Ende gebacken: neu backen"
+    ),
     "Up to date": "Auf dem neuesten Stand",
     "Up to date; no light grid is baked": "Auf dem neuesten Stand; kein Lichtgitter ist gebacken",
 }
