@@ -34,8 +34,10 @@ as long as a check for each kind"""
         if isinstance(result, checking.Checked):
             checking.list_checked(result)
             return None
-        self.report({"INFO"}, light_repair.write_fixed(context, result))
-        self.keep_what_is_written()
+        told = light_repair.write_fixed(context, result)
+        if told:
+            self.report({"INFO"}, told)
+            self.keep_what_is_written()
         more = light_repair.work_after(context, result)
         if more is None:
             more = light_repair.work_on(context, self._left.pop(0)) if self._left else checking.check(context)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One-click fixes of what the check finds, written into light meshes of the open file."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 
 from vlm_addon.bake import BakeSettings
-from vlm_addon.blender import authoring, checking
+from vlm_addon.blender import authoring, checking, light_repair
 from vlm_addon.blender.drawing import draw_lights
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.findings import fixable_kinds, marked_faces, select_offenders
@@ -219,6 +220,121 @@ def test_a_mesh_of_another_file_is_left_alone_and_said_to_be(cube_lights, tmp_pa
     (told,) = fix(kinds.BRIGHT)
     assert "left out 'VLM'" in told
     assert read_faces(cube_lights, "vlm_color")[3, :3].tolist() == [4.0, 2.0, 1.0]
+
+
+def without_a_face(thing, face=0):
+    """What an artist may do while work goes on."""
+    edited = bmesh.new()
+    edited.from_mesh(thing.data)
+    edited.faces.ensure_lookup_table()
+    bmesh.ops.delete(edited, geom=[edited.faces[face]], context="FACES")
+    edited.to_mesh(thing.data)
+    edited.free()
+
+
+def without_it(thing):
+    bpy.data.objects.remove(thing)
+
+
+@pytest.mark.parametrize("change", [without_a_face, without_it])
+def test_what_was_changed_while_a_fix_was_worked_out_is_to_be_fixed_again(cube_lights, change):
+    spoil(cube_lights, "vlm_color", 11, 4.0)
+    before = read_faces(cube_lights, "vlm_color")[1:]
+    made = work_on(bpy.context, kinds.BRIGHT)(silent)
+    change(cube_lights)
+    with pytest.raises(InvalidInput, match=r"'VLM'.*changed while its lights were judged; fix it again"):
+        write_fixed(bpy.context, made)
+    if bpy.data.objects.get("VLM") is not None:
+        assert np.array_equal(read_faces(cube_lights, "vlm_color"), before)
+
+
+def test_what_was_changed_before_its_lights_are_paired_is_to_be_fixed_again(make_plane):
+    make_plane("sheet", size=1.0).location.z = 1.0
+    make_plane("floor", size=4.0)
+    bpy.context.view_layer.update()
+    authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
+    thing = bpy.data.objects["VLM"]
+    made = work_on(bpy.context, kinds.TWO_SIDED)(silent)
+    assert write_fixed(bpy.context, made) == ""
+    without_a_face(thing)
+    with pytest.raises(InvalidInput, match="changed while its lights were judged"):
+        work_after(bpy.context, made)
+    assert not read_faces(thing, "vlm_tag").any()
+
+
+def test_a_fix_reads_in_the_window_and_looks_in_the_background(cube_lights, monkeypatch):
+    judged = []
+    check_light_mesh = light_repair.check_light_mesh
+    monkeypatch.setattr(light_repair, "check_light_mesh", lambda *a, **k: judged.append(1) or check_light_mesh(*a, **k))
+    for kind in (kinds.THIN, kinds.TWO_SIDED, kinds.IN_FRONT):
+        work = work_on(bpy.context, kind)
+        assert not judged
+        work(silent)
+        assert judged.pop()
+
+
+@pytest.mark.parametrize("change", [without_a_face, without_it])
+def test_a_check_of_what_was_changed_meanwhile_is_listed_but_selects_nothing(cube_lights, change):
+    spoil(cube_lights, "vlm_color", 11, 4.0)
+    made = checking.check(bpy.context)(silent)
+    change(cube_lights)
+    checking.list_checked(made)
+    (finding,) = bpy.context.scene.vlm.findings
+    assert finding.kind == kinds.BRIGHT
+    with pytest.raises(InvalidInput, match=r"12 when it was checked|gone or was renamed since the check"):
+        select_offenders(bpy.context, 0)
+
+
+def instanced_at(things, x):
+    """Put objects into a collection that is shown by an instance at (x, 0, 0) alone."""
+    collection = bpy.data.collections.new("set")
+    bpy.context.scene.collection.children.link(collection)
+    for thing in things:
+        for each in list(thing.users_collection):
+            each.objects.unlink(thing)
+        collection.objects.link(thing)
+    bpy.context.view_layer.layer_collection.children["set"].exclude = True
+    instancer = bpy.data.objects.new("instancer", None)
+    instancer.instance_type, instancer.instance_collection = "COLLECTION", collection
+    instancer.location.x = x
+    bpy.context.scene.collection.objects.link(instancer)
+    bpy.context.view_layer.update()
+
+
+def test_an_instance_of_a_light_mesh_is_not_moved_and_said_to_be(cube_lights):
+    for vertex in cube_lights.data.vertices:
+        vertex.co *= 1.1
+    cube_lights.data.update()
+    instanced_at([bpy.data.objects["Cube"], cube_lights], 10.0)
+    before = [vertex.co.copy() for vertex in cube_lights.data.vertices]
+    assert kinds.IN_FRONT in check()
+    (told,) = fix(kinds.IN_FRONT)
+    assert "left out 'VLM', which instances show elsewhere" in told
+    assert [vertex.co for vertex in cube_lights.data.vertices] == before
+
+
+def test_colours_of_an_instance_are_mended(cube_lights):
+    spoil(cube_lights, "vlm_color", 3, (4.0, 2.0, 1.0, 1.0))
+    instanced_at([bpy.data.objects["Cube"], cube_lights], 10.0)
+    assert check() == [kinds.BRIGHT]
+    (told,) = fix(kinds.BRIGHT)
+    assert "left out" not in told
+    assert read_faces(cube_lights, "vlm_color")[3, :3] == pytest.approx([1.0, 0.5, 0.25], rel=1e-6)
+
+
+def test_a_mesh_that_two_light_meshes_share_is_mended_once(cube_lights):
+    twin = cube_lights.copy()
+    bpy.context.scene.collection.objects.link(twin)
+    spoil(cube_lights, "vlm_color", 3, (4.0, 2.0, 1.0, 1.0))
+    assert kinds.BRIGHT in check()
+    (told,) = fix(kinds.BRIGHT)
+    assert "left out" not in told
+    assert read_faces(twin, "vlm_color")[3, :3] == pytest.approx([1.0, 0.5, 0.25], rel=1e-6)
+    for vertex in twin.data.vertices:
+        vertex.co *= 1.05
+    twin.data.update()
+    (told,) = fix(kinds.IN_FRONT)
+    assert "; left out 'VLM.001', whose mesh another light mesh has, too" in told
 
 
 def test_offenders_are_selected_in_edit_mode(cube_lights):

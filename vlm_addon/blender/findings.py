@@ -51,16 +51,19 @@ CLASSES = (VLM_PG_mark, VLM_PG_finding)
 
 
 def list_findings(scene: Any, findings: Sequence[Finding], origins: LightOrigins | None = None) -> None:
-    """Keep the findings in `scene`, in place of those before. origins: of the lights that the findings name."""
+    """Keep the findings in `scene`, in place of those before. origins: of the lights that the findings name; light
+    meshes are not looked at, they may have changed since."""
     scene.vlm.findings.clear()
     for finding in findings:
         item = scene.vlm.findings.add()
         item.text, item.kind, item.fixable = str(finding), finding.kind, fixable(finding.kind)
-        faces = origins.faces_by_object(finding.lights) if origins is not None and finding.lights else {}
-        for owner, rows in faces.items():
+        if origins is None or not finding.lights:
+            continue
+        counts = dict(zip(origins.objects, origins.face_counts, strict=True))
+        for owner, rows in origins.faces_by_object(finding.lights).items():
             mark = item.marks.add()
             mark.owner, mark.faces = owner, spans_text(rows)
-            mark.face_count = len(scene.objects[owner].data.polygons)
+            mark.face_count = counts[owner]
 
 
 def fixable(kind: str) -> bool:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from ..core.errors import InvalidInput
 from ..core.scene import UNTAGGED
 from ..core.tag_pairs import is_automatic
-from .light_faces import read_faces
+from .light_faces import face_count, read_faces
 from .names import (
     ID_PROPERTY,
     SCHEMA_PROPERTY,
@@ -214,6 +214,19 @@ def require_editable(thing: Any) -> None:
     if version > SCHEMA_VERSION:
         remedy = "open it with the version of the extension that wrote it"
         raise InvalidInput(subject, f"{SCHEMA_PROPERTY} is {version}, not {SCHEMA_VERSION}", remedy)
+
+
+def unchanged_light_mesh(scene: Any, name: str, count: int, doing: str, remedy: str) -> Any:
+    """The light mesh of that name, for work that numbered its faces when it had `count` of them.
+
+    doing: what the work was, for the message. Raises InvalidInput where it is gone, has another number of faces or
+    cannot be changed.
+    """
+    thing = scene.objects.get(name)
+    if thing is None or not is_light_mesh(thing) or face_count(thing) != count:
+        raise InvalidInput(f"light mesh {name!r}", f"it was changed while {doing}", remedy)
+    require_editable(thing)
+    return thing
 
 
 def tags_of(thing: Any) -> npt.NDArray[np.int32]:

@@ -2,7 +2,7 @@
 """One-click fixes of what the check finds: core/repair.py's arrays written into the light meshes of the open file.
 
 One kind of finding at a time: what one fix changes decides what the next one finds. Lights that modifiers made, linked
-light meshes and, for moving, light meshes that are deformed are left alone and said to be.
+light meshes and, for moving, light meshes that are deformed or shown by instances are left alone and said to be.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-import bmesh
 import bpy
 import numpy as np
 
@@ -22,8 +21,7 @@ from ..core.light_marks import LightHistory
 from ..core.light_mesh import VirtualLightMesh
 from ..core.mesh_topology import Int64
 from ..core.progress import Progress
-from ..core.repair import Repair, fix
-from ..core.scene import Float64
+from ..core.repair import fix
 from ..core.validate import check_light_mesh
 from .authoring import lights
 from .checking import extract_edited
@@ -38,24 +36,22 @@ from .names import (
     EMISSION_ATTRIBUTE,
     HUE_PROPERTY,
     STRENGTH_PROPERTY,
-    TAG_ATTRIBUTE,
 )
+from .stored_values import set_value
 from .tagging.tag_pairing import Retagged, pair_lights, paired_text, read_tagging, write_retagged
+from .write_repair import Repaired, stored_light_mesh, write_repair
 
 
 @dataclass(frozen=True)
-class Repaired:
-    """One fix that is yet to be written. lights: rows it is about, none where there was nothing to fix."""
+class ToPair:
+    """Lights, (n,) rows, that are yet to be paired with what they stand for."""
 
-    kind: str
     lights: Int64
-    light_mesh: VirtualLightMesh
     origins: LightOrigins
-    repair: Repair | None
 
 
-Fixed = Repaired | Retagged
-"""What a step of fixing gives: a repair of lights, or new tags."""
+Fixed = Repaired | ToPair | Retagged
+"""What a step of fixing gives: a repair of lights, lights that need tags, or new tags."""
 
 
 def kinds_to_fix(scene: Any, kind: str) -> list[str]:
@@ -81,12 +77,11 @@ def work_on(context: Any, kind: str) -> Callable[[Progress], Fixed]:
     if light_mesh is None or origins is None:
         raise InvalidInput("scene", "it has no virtual lights", "create some first")
     history = light_history(context.scene, found)
-    if kind in TAGGED:
-        rows = _rows(kind, light_mesh, found.snapshot.meshes, history)
-        return _tag_work(context, origins.faces_by_object(rows))
 
-    def work(progress: Progress) -> Repaired:
+    def work(progress: Progress) -> Fixed:
         rows = _rows(kind, light_mesh, found.snapshot.meshes, history)
+        if kind in TAGGED:
+            return ToPair(rows, origins)
         repair = None
         if len(rows):
             repair = fix(kind, light_mesh, found.snapshot.meshes, rows, polygon_of_light=_polygons(origins))
@@ -108,9 +103,12 @@ def _rows(kind: str, light_mesh: VirtualLightMesh, meshes: Any, history: LightHi
     return np.unique(np.array(rows, np.int64))
 
 
-def _tag_work(context: Any, faces: dict[str, Any]) -> Callable[[Progress], Retagged]:
-    """Work that pairs some faces of the light meshes with what they stand for."""
-    things = [thing for thing in light_meshes(context.scene) if thing.name in faces and is_local(thing)]
+def _tag_work(context: Any, rows: Int64, origins: LightOrigins) -> Callable[[Progress], Retagged]:
+    """Work that pairs some lights with what they stand for. Raises InvalidInput where their light meshes changed."""
+    faces = origins.faces_by_object(rows)
+    numbers = {name: number for number, name in enumerate(origins.objects)}
+    found = [stored_light_mesh(context.scene, origins, numbers[name]) for name in sorted(faces)]
+    things = [thing for thing in found if thing is not None]
     tagging = read_tagging(context, things)
     chosen = [np.zeros(face_count(thing), bool) for thing in things]
     for rows, thing in zip(chosen, things, strict=True):
@@ -120,7 +118,9 @@ def _tag_work(context: Any, faces: dict[str, Any]) -> Callable[[Progress], Retag
 
 
 def write_fixed(context: Any, made: Fixed) -> str:
-    """Write one fix; returns what was done in words. Raises VlmError before anything is written."""
+    """Write one fix; returns what was done in words, "" where nothing is yet. Raises VlmError before it writes."""
+    if isinstance(made, ToPair):
+        return ""
     if isinstance(made, Retagged):
         return paired_text(made, write_retagged(context, made))
     if made.repair is None:
@@ -128,22 +128,23 @@ def write_fixed(context: Any, made: Fixed) -> str:
     with _object_mode(context):
         if made.kind in kinds.BROKEN:
             return f"Mended the values of {lights(_mend_values(context.scene))}"
-        left_out = _write_repair(context.scene, made)
+        left_out = write_repair(context.scene, made)
     sentence = made.repair.sentence
-    if left_out:
-        sentence += f"; left out {left_out[0]!r}{f' and {len(left_out) - 1} more' if len(left_out) > 1 else ''}"
-        sentence += ", which modifiers or shape keys deform, or another file holds"
+    for reason, names in left_out.items():
+        sentence += f"; left out {names[0]!r}{f' and {len(names) - 1} more' if len(names) > 1 else ''}, {reason}"
     return sentence
 
 
 def work_after(context: Any, made: Fixed) -> Callable[[Progress], Fixed] | None:
-    """What a written fix leaves to do: tags for lights that could not be moved far enough. Raises VlmError."""
+    """What a fix leaves to do: tags, for lights that could not be moved far enough as well. Raises VlmError."""
+    if isinstance(made, ToPair):
+        return _tag_work(context, made.lights, made.origins)
     if isinstance(made, Retagged) or made.repair is None or made.repair.tag_ids is None:
         return None
     if made.kind == kinds.LOST_TAG:
         return None
     tagged = np.flatnonzero(made.repair.tag_ids != made.light_mesh.tag_ids)
-    return _tag_work(context, made.origins.faces_by_object(tagged))
+    return _tag_work(context, tagged, made.origins)
 
 
 @contextmanager
@@ -178,98 +179,7 @@ def _mend_values(scene: Any) -> int:
                 factors = np.atleast_1d(np.array(thing[name], np.float64))
                 sound = np.maximum(np.where(np.isfinite(factors), factors, 1.0), 0.0)
                 if not np.array_equal(factors, sound):
-                    thing[name] = sound.tolist() if len(sound) > 1 else float(sound[0])
+                    set_value(thing, name, sound.tolist() if len(sound) > 1 else float(sound[0]))
                     wrong[:] = True
         changed += int(wrong.sum())
     return changed
-
-
-def _write_repair(scene: Any, made: Repaired) -> list[str]:
-    """Write a repair into the light meshes; returns the names of those that it could not be written into."""
-    assert made.repair is not None
-    ends = np.cumsum(made.origins.vertex_counts)
-    left_out, seen = [], set()
-    for number, name in enumerate(made.origins.objects):
-        thing = scene.objects.get(name)
-        rows = np.flatnonzero(made.origins.owner == number)
-        vertices = slice(int(ends[number]) - made.origins.vertex_counts[number], int(ends[number]))
-        if not _touches(made, rows, vertices):
-            continue
-        moves = made.repair.vertices is not None and not _is_rigid(thing, made.origins.vertex_counts[number])
-        unknown = (made.origins.faces[rows] < 0).any()
-        if thing is None or not is_local(thing) or thing.data.name in seen or moves or unknown:
-            left_out.append(name)
-            continue
-        seen.add(thing.data.name)
-        _write_values(thing, made, rows)
-        _write_geometry(thing, made, rows, vertices)
-    return left_out
-
-
-def _touches(made: Repaired, rows: Int64, vertices: slice) -> bool:
-    repair = made.repair
-    assert repair is not None
-    moved = repair.vertices is not None and (repair.vertices[vertices] != made.light_mesh.vertices[vertices]).any()
-    return bool(moved) or bool(np.isin(made.lights, rows).any())
-
-
-def _is_rigid(thing: Any, vertex_count: int) -> bool:
-    """Whether the vertices of a light mesh are where they are stored."""
-    deformed = thing is not None and (len(thing.modifiers) or thing.data.shape_keys is not None)
-    return thing is not None and not deformed and len(thing.data.vertices) == vertex_count
-
-
-def _write_values(thing: Any, made: Repaired, rows: Int64) -> None:
-    """Colours, strengths and tags of the lights `rows`, into the faces that they are parts of."""
-    repair, before = made.repair, made.light_mesh
-    assert repair is not None
-    faces = made.origins.faces[rows]
-    if repair.colour is not None:
-        factor = np.ones(face_count(thing))
-        factor[faces] = _ratio(repair.colour[rows].max(axis=1), before.colour[rows].max(axis=1))
-        color = read_faces(thing, COLOR_ATTRIBUTE)
-        color[:, :3] *= factor[:, None]
-        write_faces(thing, COLOR_ATTRIBUTE, color)
-    if repair.strength is not None:
-        factor = np.ones(face_count(thing))
-        factor[faces] = _ratio(repair.strength[rows], before.strength[rows])
-        write_faces(thing, AREA_SCALE_ATTRIBUTE, read_faces(thing, AREA_SCALE_ATTRIBUTE) * factor)
-    if repair.tag_ids is not None and made.kind == kinds.LOST_TAG:
-        tags = read_faces(thing, TAG_ATTRIBUTE)
-        tags[faces] = repair.tag_ids[rows]
-        write_faces(thing, TAG_ATTRIBUTE, tags)
-
-
-def _ratio(after: Any, before: Any) -> Float64:
-    one, other = np.asarray(after, np.float64), np.asarray(before, np.float64)
-    return np.divide(one, other, out=np.ones_like(one), where=other > 0.0)
-
-
-def _write_geometry(thing: Any, made: Repaired, rows: Int64, vertices: slice) -> None:
-    """Moved vertices, faces turned over and faces taken away."""
-    repair = made.repair
-    assert repair is not None
-    flipped = np.unique(made.origins.faces[np.intersect1d(rows, repair.flipped)])
-    deleted = np.unique(made.origins.faces[np.intersect1d(rows, repair.deleted)])
-    moved = np.zeros(0, np.int64)
-    if repair.vertices is not None:
-        moved = np.flatnonzero((repair.vertices[vertices] != made.light_mesh.vertices[vertices]).any(axis=1))
-    if not len(flipped) + len(deleted) + len(moved):
-        return
-    mesh = bmesh.new()
-    try:
-        mesh.from_mesh(thing.data)
-        mesh.verts.ensure_lookup_table()
-        mesh.faces.ensure_lookup_table()
-        if repair.vertices is not None:
-            to_local = np.linalg.inv(np.array(thing.matrix_world, np.float64))
-            local = repair.vertices[vertices][moved] @ to_local[:3, :3].T + to_local[:3, 3]
-            for vertex, place in zip(moved.tolist(), local.tolist(), strict=True):
-                mesh.verts[vertex].co = place
-        for face in flipped.tolist():
-            mesh.faces[face].normal_flip()
-        bmesh.ops.delete(mesh, geom=[mesh.faces[face] for face in deleted.tolist()], context="FACES")
-        mesh.to_mesh(thing.data)
-    finally:
-        mesh.free()
-    thing.data.update()

@@ -18,10 +18,10 @@ from .drawing.draw_points import LIKELY_SPAN, require_distance
 from .extraction.color_space import convert, rec709_to_working
 from .extraction.extract import ExtractOptions, extract_scene
 from .light_colors import ATTRIBUTES, FaceValues, chosen_areas, new_values, one_per_mesh, write_planned
-from .light_faces import chosen_faces, face_count, read_faces
+from .light_faces import chosen_faces, read_faces
 from .light_geometry import LightFaces, light_faces_in_world
-from .light_meshes import require_editable
-from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE, is_light_mesh
+from .light_meshes import require_editable, unchanged_light_mesh
+from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE
 from .source_colors import SourceColors, SurfaceColors
 
 POINT, OBJECT = "POINT", "OBJECT"
@@ -85,7 +85,8 @@ def write_recolored(context: Any, made: Recolored) -> str:
     planned: list[FaceValues] = []
     missed = 0
     for wanted, colors in made.found:
-        thing = _unchanged(context.scene, wanted)
+        count, doing = len(wanted.chosen), "its materials were looked up"
+        thing = unchanged_light_mesh(context.scene, wanted.name, count, doing, "recolor it again")
         chosen = wanted.chosen.copy()
         chosen[wanted.chosen] = colors.found
         missed += int((~colors.found).sum())
@@ -94,15 +95,6 @@ def write_recolored(context: Any, made: Recolored) -> str:
     if missed:
         told += f"; {lights(missed)} with no visible surface in front as before"
     return told + (f"; {lights(made.locked)} locked" if made.locked else "")
-
-
-def _unchanged(scene: Any, wanted: Wanted) -> Any:
-    thing = scene.objects.get(wanted.name)
-    if thing is None or not is_light_mesh(thing) or face_count(thing) != len(wanted.chosen):
-        problem = "it was changed while its materials were looked up"
-        raise InvalidInput(f"light mesh {wanted.name!r}", problem, "recolor it again")
-    require_editable(thing)
-    return thing
 
 
 def _values(thing: Any, chosen: Bool, colors: SurfaceColors, quantity: str) -> list[FaceValues]:

@@ -43,13 +43,16 @@ class LightOrigins:
     """Where the lights of a scene are stored. objects: names of the light meshes, in the order of their lights and
     vertices. vertex_counts: of each. owner: (n,) int32, row in objects. faces: (n,) int32, the face of the stored mesh
     that each light is (a part of), -1 where modifiers made it or the light mesh is linked. marks: (n,) int32, with whom
-    each was made (core/light_marks.py)."""
+    each was made (core/light_marks.py). face_counts: of the stored mesh of each object, by which it is known later
+    whether the numbers of faces still mean the same. instanced: whether an instance of the object shines, elsewhere."""
 
     objects: tuple[str, ...]
     vertex_counts: tuple[int, ...]
     owner: Int32
     faces: Int32
     marks: Int32
+    face_counts: tuple[int, ...]
+    instanced: tuple[bool, ...]
 
     def faces_by_object(self, lights: npt.ArrayLike) -> dict[str, Int32]:
         """The stored faces of some lights, (k,) rows, by the name of their object, each once, ascending."""
@@ -77,6 +80,8 @@ class _Read:
     name: str
     faces: Int32
     marks: Int32
+    face_count: int
+    is_instance: bool = False
 
 
 def extract(options: ExtractOptions | None = None, depsgraph: Any = None, broken_values: bool = False) -> Extraction:
@@ -130,6 +135,8 @@ def origins_of(thing: Any) -> LightOrigins:
         np.zeros(count, np.int32),
         np.arange(count, dtype=np.int32),
         np.zeros(count, np.int32) if marks is None else marks,
+        (count,),
+        (False,),
     )
 
 
@@ -138,7 +145,8 @@ def _origins(found: list[_Read]) -> LightOrigins:
     names = tuple(each.name for each in found)
     vertices = tuple(len(each.lights.vertices) for each in found)
     faces, marks = (np.concatenate(parts) for parts in zip(*((each.faces, each.marks) for each in found), strict=True))
-    return LightOrigins(names, vertices, owner, faces, marks)
+    counts, instanced = tuple(each.face_count for each in found), tuple(each.is_instance for each in found)
+    return LightOrigins(names, vertices, owner, faces, marks, counts, instanced)
 
 
 def _with_source_points(
@@ -170,7 +178,8 @@ def _read_light_meshes(depsgraph: Any, report: FindingList, broken_values: bool 
         if is_light_mesh(instance.object) and instance.object.type == "MESH":
             seen.add(instance.object.name_full)
             matrix = np.array(instance.matrix_world, np.float64)
-            found.append(_read_object(instance.object, matrix, to_rec709, report, broken_values))
+            read = _read_object(instance.object, matrix, to_rec709, report, broken_values)
+            found.append(replace(read, is_instance=instance.is_instance))
     for blender_object in _left_out(depsgraph, seen, report):
         matrix = np.array(blender_object.matrix_world, np.float64)
         found.append(_read_object(blender_object, matrix, to_rec709, report, broken_values))
@@ -221,7 +230,7 @@ def _read_lights(
     if not len(local.triangles):
         report(owner, "it has no faces", "it gives no light: draw some, or delete it")
         none = np.zeros(0, np.int32)
-        return _Read(empty_light_mesh(), blender_object.original.name, none, none)
+        return _Read(empty_light_mesh(), blender_object.original.name, none, none, 0)
     count = len(mesh.polygons)
     color = face_attribute(mesh, COLOR_ATTRIBUTE, "FLOAT_COLOR")
     if color is None:
@@ -255,4 +264,5 @@ def _read_lights(
     )
     marks = face_attribute(mesh, MARK_ATTRIBUTE, "INT")
     marks = (np.zeros(count, np.int32) if marks is None else marks)[local.faces]
-    return _Read(read, original.name, local.faces if stored else np.full(lights, -1, np.int32), marks)
+    faces = local.faces if stored else np.full(lights, -1, np.int32)
+    return _Read(read, original.name, faces, marks, len(original.data.polygons))

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import InvalidInput
 from ...core.exact_tags import Tags, pair_exactly
 from ...core.light_links import make_links
 from ...core.light_mesh import VirtualLightMesh, empty_light_mesh
@@ -24,10 +23,10 @@ from ...core.tag_pairs import living_tags, unpaired
 from ...core.thin_surface import thin_triangles
 from ..interface.availability import has_geometry
 from ..light_colors import one_per_mesh
-from ..light_faces import face_count, read_faces
+from ..light_faces import read_faces
 from ..light_geometry import light_faces_in_world
-from ..light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources
-from ..names import TAG_ATTRIBUTE, is_light_mesh
+from ..light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources, unchanged_light_mesh
+from ..names import TAG_ATTRIBUTE
 from .light_tags import counted, unused_automatic_tag, write_tags
 from .other_lights import OtherLights, StoredLinks, distributed, read_others
 from .region_pairs import RegionPairs, SourceLights, region_pairs
@@ -223,7 +222,8 @@ def write_retagged(context: Any, made: Retagged) -> Written:
     before = made.before
     light_tags = _by_light_mesh(before, made.light_tags)
     things = [
-        _unchanged_light_mesh(context.scene, name, tags) for name, tags in zip(before.names, light_tags, strict=True)
+        unchanged_light_mesh(context.scene, name, len(tags), "its lights were paired", "pair them again")
+        for name, tags in zip(before.names, light_tags, strict=True)
     ]
     require_unchanged(before.source, made.face_tags)
     changed = [context.scene.objects.get(each.name) for each in made.elsewhere]
@@ -240,14 +240,6 @@ def write_retagged(context: Any, made: Retagged) -> Written:
         objects=objects,
         links=sum(map(len, made.links)) - sum(map(len, before.links)),
     )
-
-
-def _unchanged_light_mesh(scene: Any, name: str, tags: Int32) -> Any:
-    thing = scene.objects.get(name)
-    if thing is None or not is_light_mesh(thing) or face_count(thing) != len(tags):
-        raise InvalidInput(f"light mesh {name!r}", "it was changed while its lights were paired", "pair them again")
-    require_editable(thing)
-    return thing
 
 
 def paired_text(made: Retagged, written: Written) -> str:
