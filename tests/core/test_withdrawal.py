@@ -10,9 +10,10 @@ from tests.core.surface_shapes import cube, grid, icosphere, mesh_of, sheet
 from vlm_addon.core.errors import Cancelled
 from vlm_addon.core.form_factor import paired_form_factor
 from vlm_addon.core.mesh_topology import Rows
+from vlm_addon.core.own_shares import own_shares
 from vlm_addon.core.progress import step
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
-from vlm_addon.core.withdrawal import ALLOWED, own_shares, withdraw
+from vlm_addon.core.withdrawal import ALLOWED, withdraw
 
 
 def bowl(depth: float) -> tuple[np.ndarray, np.ndarray]:

@@ -61,6 +61,18 @@ def rows_by_key(keys: Int64, row_count: int, values: Int64 | None = None) -> Row
     return Rows(order if values is None else values[order], starts)
 
 
+def rows_of(regions: Rows, chosen: Int64) -> Rows:
+    """The rows `chosen` of a ragged table, in that order."""
+    _, values = regions.expand(chosen)
+    return Rows(values, np.concatenate([[0], np.cumsum(regions.lengths[chosen])]))
+
+
+def only_rows(regions: Rows, chosen: Bool) -> Rows:
+    """The ragged table with the rows that are not chosen empty."""
+    lengths = np.where(chosen, regions.lengths, 0)
+    return Rows(regions.values[np.repeat(chosen, regions.lengths)], np.concatenate([[0], np.cumsum(lengths)]))
+
+
 def sorted_with_order(keys: Int64, bound: int) -> tuple[Int64, Int64]:
     """(keys ascending, where each was), equal ones in their order. keys: from 0 to bound - 1.
 

@@ -12,17 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from .corner_arrays import middles
 from .least_push import least_push
-from .mesh_topology import Bool, Int64, Rows, normals_and_areas, sum_by, unit_normals, vertex_faces
+from .mesh_topology import Bool, Int64, Rows, normals_and_areas, only_rows, sum_by, unit_normals, vertex_faces
 from .parallel import side_by_side, slices
 from .region_heights import heights, least_squares
 from .scene import Float64
 from .triangle_distance import flat_triangles
-from .triangle_tree import build_tree
+from .triangle_tree import TriangleTree, build_tree
 
 FirstHits = Callable[[Float64, Float64, bool], Float64]
 
@@ -62,18 +63,39 @@ class Placement:
     depth: Float64
 
 
+@dataclass(frozen=True)
+class BodyTrees:
+    """Trees over the lights and over the surface, each built when it is first asked for."""
+
+    light_corners: Float64
+    source_corners: Float64
+
+    @cached_property
+    def lights(self) -> TriangleTree:
+        """Over the lights as they were before any push."""
+        return build_tree(self.light_corners)
+
+    @cached_property
+    def source(self) -> TriangleTree:
+        """Over the visible surface."""
+        return build_tree(self.source_corners)
+
+
 def place_behind(
     positions: Float64,
     triangles: Int64,
     regions: Rows,
     source_corners: Float64,
     report: Callable[[float], None] = lambda share: None,
+    pushing: Bool | None = None,
+    trees: BodyTrees | None = None,
 ) -> Placement:
     """`positions` moved so that the plane of each light lies behind its region as far as the body is thick enough.
 
     positions: (v, 3). triangles: (n, 3). regions: source triangles of each light. source_corners: (t, 3, 3), m. No
     triangle turns over or loses more than 1 - LEAST_AREA_SHARE of its area. report: called with the share of the work
-    that is done, may raise.
+    that is done, may raise. pushing: (n,) lights that are to stand behind their regions, by default all; the
+    others only by their insets. trees: of positions[triangles] and source_corners, if known.
     """
     if not len(triangles):
         return Placement(positions, np.zeros(0, bool), np.zeros(0))
@@ -81,34 +103,39 @@ def place_behind(
     towards = _mean_normals(facing, source_corners)
     inset = insets(positions[triangles])
     around = vertex_faces(triangles, len(positions))
-    bodies = build_tree(positions[triangles]), build_tree(source_corners)
+    trees = trees or BodyTrees(positions[triangles], source_corners)
+    pushing = np.ones(len(triangles), bool) if pushing is None else pushing
+    pressing = only_rows(facing, pushing)
     surface_points = _surface_points(positions, facing, source_corners, around)
     longest = LARGEST_STEP * _smallest_around(np.sqrt(normals_and_areas(positions[triangles])[1]), around)
     # What moves by the insets alone is not looked at: no body that shows is that thin.
     least = INSETS_UNSEEN * _largest_around(inset, around)
-    moved = least_push(positions, triangles, facing, source_corners, inset, lambda share: report(PUSH_TIME * share))
+    moved = least_push(positions, triangles, pressing, source_corners, inset, lambda share: report(PUSH_TIME * share))
+    resting = np.where(pushing, -np.inf, inset)
+    moved = moved + _behind_planes(unit_normals((positions + moved)[triangles]), resting, around)
     looked_at = np.zeros_like(positions)
     stopped = np.zeros(len(positions), bool)
     for round_ in range(1 + ROUNDS):
         report(PUSH_TIME + (1.0 - PUSH_TIME) * round_ / (1 + ROUNDS))
         if round_:
             corners = (positions + moved)[triangles]
-            wanted = intrusions(corners, facing, source_corners) + inset
+            wanted = intrusions(corners, pressing, source_corners) + inset
             moved = moved + _behind_planes(unit_normals(corners), wanted, around)
         moved = _shortened(moved, longest)
         length = np.linalg.norm(moved, axis=1)
         fresh = np.linalg.norm(moved - looked_at, axis=1) > np.maximum(least, 0.01 * length)
-        # The lights' other side may come towards them, and lights that stand beyond the body's come back into it.
-        moved, hit = _within_thickness(positions, moved, np.flatnonzero(fresh), positions, bodies[0].first_hits)
-        moved, out = _within_thickness(positions, moved, np.flatnonzero(fresh), surface_points, bodies[1].first_hits)
-        hit |= out
+        if not round_:
+            # Simplification may have brought a vertex beyond the back.
+            fresh |= (length > 0) & (np.linalg.norm(surface_points - positions, axis=1) > least)
+        if fresh.any():
+            moved, hit = _inside_body(positions, moved, np.flatnonzero(fresh), surface_points, trees)
+            # Later rounds may turn the way of a stopped vertex past the edge of what stopped it, but not lengthen it.
+            longest[hit] = np.minimum(longest, np.linalg.norm(moved, axis=1))[hit]
+            stopped |= hit
         looked_at[fresh] = moved[fresh]
-        # Later rounds may turn the way of a stopped vertex past the edge of what stopped it, but not make it longer.
-        longest[hit] = np.minimum(longest, np.linalg.norm(moved, axis=1))[hit]
-        stopped |= hit
         moved = _without_flips(positions, moved, triangles, towards)
     depth = intrusions((positions + moved)[triangles], facing, source_corners)
-    limited = stopped[triangles].any(axis=1) & (depth > inset)
+    limited = stopped[triangles].any(axis=1) & (depth > inset) & pushing
     return Placement(positions + moved, limited, np.maximum(depth, 0.0))
 
 
@@ -238,6 +265,15 @@ def _surface_points(positions: Float64, regions: Rows, source_corners: Float64, 
     flat = flat_triangles(source_corners[chosen])
     points[vertex[first]] = flat.nearest_points(positions[vertex[first]], np.arange(len(chosen)))
     return points
+
+
+def _inside_body(
+    positions: Float64, moved: Float64, active: Int64, surface_points: Float64, trees: BodyTrees
+) -> tuple[Float64, Bool]:
+    """Moves cut by the lights' other side, which may come towards them, and by the body's, and which were cut."""
+    moved, hit = _within_thickness(positions, moved, active, positions, trees.lights.first_hits)
+    moved, out = _within_thickness(positions, moved, active, surface_points, trees.source.first_hits)
+    return moved, hit | out
 
 
 def _within_thickness(

@@ -18,15 +18,15 @@ from .counting import counted
 from .errors import InvalidInput
 from .light_mesh import VirtualLightMesh
 from .light_regions import facing, pushing_regions
-from .mesh_topology import Bool, Int64, Rows, rows_by_key
+from .mesh_topology import Bool, Int64, Rows, only_rows, rows_by_key
 from .nearest_lights import pair_nearest
+from .own_shares import own_shares
 from .own_tags import tagged_regions
 from .placement import STEEPEST_COSINE, insets, intrusions, place_behind
 from .plates import find_plates, plates_behind
 from .scene import UNTAGGED, Float32, Float64, Int32, Mesh
 from .triangle_tree import build_tree
 from .validate import NOTICEABLE_DEPTH, check_light_mesh
-from .withdrawal import own_shares
 
 # The most of the light that arrives that a surface can send back.
 BRIGHTEST = 1.0
@@ -207,10 +207,10 @@ def _behind(work: _Work) -> Repair:
     """Moved behind the surface; strength keeps the power where areas change. What is too thin gets tags."""
     mesh = work.light_mesh
     corners = _source_corners(work.meshes)
-    nearest = _only(_rows_of(work.regions(), len(mesh)), work.chosen)
+    nearest = only_rows(_rows_of(work.regions(), len(mesh)), work.chosen)
     # Only what the chosen lights stand for pushes: the others stay, but for the vertices that they share.
     corners, pushing = pushing_regions(mesh, nearest, corners, build_tree(corners))
-    pushing = _only(pushing, work.chosen)
+    pushing = only_rows(pushing, work.chosen)
     vertices = _moved_behind(work, pushing, corners)
     moved = replace(mesh, vertices=vertices)
     strength = (mesh.strength * _area_ratios(mesh.areas, moved.areas, work.polygons())).astype(np.float32)
@@ -230,9 +230,9 @@ def _moved_behind(work: _Work, pushing: Rows, corners: Float64) -> Float64:
     triangles = mesh.triangles.astype(np.int64)
     plates = find_plates(mesh.vertices, triangles, work.polygons())
     in_plate = plates.of_light >= 0
-    whole = _only(pushing, in_plate)
+    whole = only_rows(pushing, in_plate)
     vertices, held = plates_behind(mesh.vertices, triangles, plates, whole, corners, build_tree(corners))
-    single = _only(pushing, ~in_plate)
+    single = only_rows(pushing, ~in_plate)
     for _ in range(MOST_PUSHES):
         pushed = _pushed(vertices, triangles, single, corners)
         pushed[held] = vertices[held]
@@ -251,7 +251,7 @@ def _pushed(vertices: Float64, triangles: Int64, pushing: Rows, corners: Float64
     if not (after > before).any():
         return placed.positions
     # A light may stand in front of a part of its region that it does not shine on, and do so where it is pushed.
-    return place_behind(vertices, triangles, _only(pushing, after <= before), corners).positions
+    return place_behind(vertices, triangles, only_rows(pushing, after <= before), corners).positions
 
 
 def _area_ratios(before: Float64, after: Float64, polygons: Int64) -> Float64:
@@ -281,12 +281,6 @@ def _rows_of(light_of_triangle: tuple[Int32, ...], count: int) -> Rows:
     lights = np.concatenate([*light_of_triangle, np.zeros(0, np.int32)]).astype(np.int64)
     held = np.flatnonzero(lights >= 0)
     return rows_by_key(lights[held], count, held)
-
-
-def _only(regions: Rows, chosen: Bool) -> Rows:
-    keep = np.repeat(chosen, regions.lengths)
-    lengths = np.where(chosen, regions.lengths, 0)
-    return Rows(regions.values[keep], np.concatenate([[0], np.cumsum(lengths)]))
 
 
 def _lights(count: int) -> str:

@@ -15,10 +15,11 @@ import numpy as np
 
 from .counting import counted, counted_verb
 from .errors import InvalidInput
+from .hide_lights import HiddenLights, hide_lights
 from .kept_lights import kept_regions
 from .light_mesh import VirtualLightMesh, empty_light_mesh, join
 from .mesh_topology import Bool, Int64, Rows, closed_shells, rows_by_key, sum_by
-from .placement import Placement, place_behind, share_in_front
+from .placement import share_in_front
 from .progress import Progress, silent, step
 from .reduce_surface import ReducedSurface, reduce_surface
 from .regions import Regions, assign_regions
@@ -27,7 +28,6 @@ from .scene import Finding, Float64, Int32, Mesh
 from .settings import setting
 from .source_surface import SourceSurface, join_surface, part_of
 from .subdivide import subdivide_light_mesh
-from .withdrawal import withdraw
 
 __all__ = [
     "CreatedLightMesh",
@@ -122,14 +122,16 @@ def create_light_mesh(
     settings: SimplifySettings = SimplifySettings(),
     progress: Progress = silent,
     keep: VirtualLightMesh | None = None,
+    whole_regions: bool = False,
 ) -> CreatedLightMesh:
     """Virtual lights that stand for the surface of `meshes`, at most settings.target_triangles of them.
 
     Reflected and emitted power are those of the source. Borders between materials, tags and meshes survive, closed
     shells stay closed, and every source triangle belongs to the region of exactly one light. Without any surface the
     light mesh is empty and a finding says so. keep: lights that stay as they are, bit for bit, and count; the surface
-    that they stand for gets no others. Raises InvalidInput for a target below 1, fewer lights than are kept, or values
-    that are not finite (naming the mesh), and Cancelled.
+    that they stand for gets no others. whole_regions: whether lights stand behind all of their regions, or only as far
+    as they would shine on them, which costs less accuracy. Raises InvalidInput for a target below 1, fewer lights than
+    are kept, or values that are not finite (naming the mesh), and Cancelled.
     """
     if settings.target_triangles < 1 or settings.samples_per_light < 1:
         problem = f"{settings.target_triangles} lights with {settings.samples_per_light} samples"
@@ -137,7 +139,7 @@ def create_light_mesh(
     clock = _Clock(progress)
     clock.start(0.0, "weld")
     surface = join_surface(meshes, lambda share: step(progress, 0.1 * share, "weld"))
-    whole, kept = surface, keep if keep is not None else empty_light_mesh()
+    every, kept = surface, keep if keep is not None else empty_light_mesh()
     held = kept_regions(kept, surface.corners, surface.normals)
     if len(kept):
         surface = part_of(surface, held < 0)
@@ -149,39 +151,27 @@ def create_light_mesh(
     lights = reduce_surface(surface, target, lambda share: step(progress, 0.1 + 0.5 * share, "simplify"))
     if not len(lights.triangles):
         clock.stop()
-        return _nothing(meshes, whole, kept, held, clock)
+        return _nothing(meshes, every, kept, held, clock)
     clock.start(0.6, "regions")
     regions = assign_regions(surface, lights, lambda share: step(progress, 0.6 + 0.1 * share, "regions"))
     clock.start(0.7, "place")
+    placing = lambda share: step(progress, 0.7 + 0.2 * share, "place")  # noqa: E731
+    hidden = hide_lights(surface, lights, regions, whole_regions, placing)
+    regions = replace(regions, light=hidden.light)
     own = _region_rows(regions, ~regions.adopted, len(lights.triangles))
-    placement = place_behind(
-        lights.positions,
-        lights.triangles,
-        own,
-        surface.corners,
-        lambda share: step(progress, 0.7 + 0.15 * share, "place"),
-    )
-    clock.start(0.85, "withdraw")
-    withdrawal = withdraw(
-        placement.positions,
-        lights.triangles,
-        own,
-        surface.corners,
-        lambda share: step(progress, 0.85 + 0.05 * share, "withdraw"),
-    )
     clock.start(0.9, "sample")
-    placed = replace(lights, triangles=withdrawal.triangles)
-    light_mesh = _coloured(surface, placed, regions, withdrawal.positions, settings)
+    placed = replace(lights, triangles=hidden.triangles)
+    light_mesh = _coloured(surface, placed, regions, hidden.positions, settings)
     clock.start(0.95, "check")
     in_front = share_in_front(light_mesh.corners, own, surface.corners)
     clock.stop()
-    report = _report(surface, lights, light_mesh, regions, placement, in_front, clock)
+    report = _report(surface, lights, light_mesh, regions, hidden, in_front, clock)
     report = replace(report, kept_lights=len(kept))
     step(progress, 1.0, "done")
     of_triangle = held.copy()
     of_triangle[held < 0] = regions.light + len(kept)
     both = join([kept, light_mesh]) if len(kept) else light_mesh
-    return CreatedLightMesh(both, _by_mesh(meshes, whole, of_triangle), report)
+    return CreatedLightMesh(both, _by_mesh(meshes, every, of_triangle), report)
 
 
 def _nothing(
@@ -275,7 +265,7 @@ def _report(
     lights: ReducedSurface,
     light_mesh: VirtualLightMesh,
     regions: Regions,
-    placement: Placement,
+    hidden: HiddenLights,
     in_front: float,
     clock: _Clock,
 ) -> SimplifyReport:
@@ -301,19 +291,19 @@ def _report(
         closed_shells_before=int((surface.closed & present).sum()),
         closed_shells_after=still_closed,
         share_in_front=in_front,
-        limited_lights=int(placement.limited.sum()),
+        limited_lights=int(hidden.limited.sum()),
         unlit_area=surface.unlit_area,
         kept_lights=0,
         findings=(),
     )
-    return replace(report, findings=_findings(report, lights, placement))
+    return replace(report, findings=_findings(report, lights, hidden))
 
 
 def _triple(values: Float64) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _findings(report: SimplifyReport, lights: ReducedSurface, placement: Placement) -> tuple[Finding, ...]:
+def _findings(report: SimplifyReport, lights: ReducedSurface, hidden: HiddenLights) -> tuple[Finding, ...]:
     found = list(_unlit(report.unlit_area))
     if report.shells_dropped:
         problem = f"of {counted(report.shells, 'separate piece')}, {report.shells_dropped} got no light"
@@ -330,7 +320,7 @@ def _findings(report: SimplifyReport, lights: ReducedSurface, placement: Placeme
         )
         found.append(Finding("light mesh", problem, "ask for more lights"))
     if report.limited_lights:
-        first, depth = int(np.argmax(placement.limited)), float(placement.depth[placement.limited].max())
+        first, depth = int(np.argmax(hidden.limited)), float(hidden.depth[hidden.limited].max())
         problem = (
             f"{counted(report.limited_lights, 'light')} (first: {first}) cannot be placed behind the surface because "
             f"the body is too thin: up to {depth:.3g} m in front of it"

@@ -19,6 +19,7 @@ from .light_mesh import VirtualLightMesh
 from .light_overlaps import badly_joined, covered_twice
 from .mesh_topology import Bool, Int64, normals_and_areas, rows_by_key, sum_by
 from .nearest_lights import light_of_triangles
+from .own_shares import ALLOWED, seen_factors
 from .placement import insets
 from .progress import Report, between
 from .scene import Finding, Float64, Int32, Mesh
@@ -34,6 +35,8 @@ LEAST_QUALITY = 1e-6
 # Depth in front of the source surface that counts, as a share of the size (square root of the area) of the light.
 NOTICEABLE_DEPTH = 1e-3
 NOTICEABLE_SHARE = 0.01
+# A light floats in front of its surface if the part nearest to it is further away than this share of the relief.
+RELIEF = 0.5
 # Triangles of each region at which the thickness of the body is looked for, or up to twice as many.
 THICKNESS_PLACES = 24
 # Mean cosine between a light and its source samples below which it counts as inside out: a light that stands for a
@@ -248,14 +251,15 @@ def _source_findings(light_mesh: VirtualLightMesh, surface: _Surface, report: Re
     reversed_ = (counts > 0) & (area > 0) & (facing < INSIDE_OUT_COSINE)
     problem = "their front away from the surface they stand for (mean cosine)"
     _append(found, reversed_, facing, problem, "flip their normals", kinds.INSIDE_OUT)
-    share, depth = _in_front(light_mesh, normal)
+    share, depth, matters = _in_front(light_mesh, normal)
     share = np.where(reversed_, 0.0, share)
-    found.extend(_depth_findings(share, depth, surface, report))
+    found.extend(_depth_findings(share, depth, matters, surface, report))
     return found
 
 
-def _in_front(light_mesh: VirtualLightMesh, normal: Float64) -> tuple[Float64, Float64]:
-    """((n,) share of the surface of each light that lies behind its plane, (n,) m, how far); seed 002, figure 3.5."""
+def _in_front(light_mesh: VirtualLightMesh, normal: Float64) -> tuple[Float64, Float64, Bool]:
+    """((n,) share of the surface of each light that lies behind its plane, (n,) m, how far; seed 002, figure 3.5, and
+    (n,) whether it matters: creation leaves a light within the relief of its surface if it shines on none of that)."""
     samples, corners = light_mesh.samples, light_mesh.corners
     owner = np.repeat(np.arange(len(light_mesh)), np.diff(samples.offsets))
     offset = samples.positions - corners[owner, 0]
@@ -263,18 +267,28 @@ def _in_front(light_mesh: VirtualLightMesh, normal: Float64) -> tuple[Float64, F
     noticeable = np.maximum(NOTICEABLE_DEPTH * np.sqrt(light_mesh.areas), insets(corners))
     behind = depth > noticeable[owner]
     share = sum_by(owner, samples.weights.astype(np.float64) * behind, len(light_mesh))
-    deepest = np.zeros(len(light_mesh))
+    deepest, nearest = np.zeros(len(light_mesh)), np.full(len(light_mesh), np.inf)
     np.maximum.at(deepest, owner, depth)
-    return share, deepest
+    np.minimum.at(nearest, owner, depth)
+    floats = nearest > np.maximum(noticeable, RELIEF * (deepest - nearest))
+    return share, deepest, floats | (_own_light(light_mesh, owner) > ALLOWED)
 
 
-def _depth_findings(share: Float64, depth: Float64, surface: _Surface, report: Report) -> list[Finding]:
+def _own_light(light_mesh: VirtualLightMesh, owner: Int64) -> Float64:
+    """(n,) mean share of its radiosity that the source samples of each light receive from it, rows of `owner`."""
+    samples = light_mesh.samples
+    normals = samples.normals.astype(np.float64)
+    factors = seen_factors(samples.positions, normals, light_mesh.corners, owner) * light_mesh.strength[owner]
+    return sum_by(owner, samples.weights * factors, len(light_mesh))
+
+
+def _depth_findings(share: Float64, depth: Float64, matters: Bool, surface: _Surface, report: Report) -> list[Finding]:
     """What stands in front, apart where the body is too thin to move it (figure 3.7) or has no inside (figure 3.6)."""
     stands = (share > NOTICEABLE_SHARE) & ~surface.excused()
     thin = stands & surface.thin(stands, between(report, 0.0, 0.5))
     seen = surface.two_sided(between(report, 0.5, 1.0))
     found = []
-    movable = stands & ~thin
+    movable = stands & ~thin & matters
     remedy = "move them behind it, or give both a common tag where the body is thin"
     if movable.any():
         problem = f"{_stand(movable)} in front of the surface {_worst(movable, share, depth)}"

@@ -15,19 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .form_factor import paired_form_factor
-from .mesh_topology import Bool, Int64, Rows, sum_by, unit_normals
+from .mesh_topology import Bool, Int64, Rows, rows_of, sum_by, unit_normals
+from .own_shares import NEGLIGIBLE, Allowance, own_shares, region_areas
 from .placement import insets
-from .sampling import sample_regions
 from .scene import Float64
 from .triangle_tree import TriangleTree, build_tree
 
 # Points of each region at which its own light is measured, first of all lights, then of those that may withdraw.
-ROUGH_POINTS, FINE_POINTS = 16, 32
+ROUGH_POINTS, FINE_POINTS = 32, 32
 # Mean share of a light's radiosity that its own region may receive.
 ALLOWED = 2e-3
-# Mean own light of all surfaces, of lights of radiosity 1, that the least offenders may leave together.
-NEGLIGIBLE = 3e-5
+WHOLE = Allowance(ALLOWED, np.inf, NEGLIGIBLE)
 # Sizes to which lights shrink, and depths to which they move behind the deepest point of their region, in their sizes.
 SHRINKS = (1.0, 0.7, 0.45, 0.25)
 DEPTHS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.6)
@@ -57,28 +55,32 @@ def withdraw(
     regions: Rows,
     source_corners: Float64,
     report: Callable[[float], None] = lambda share: None,
+    allowance: Allowance = WHOLE,
+    tree: TriangleTree | None = None,
 ) -> Withdrawal:
     """The lights, those with own light moved to where they give less, as far as there is such a place.
 
     positions: (v, 3), m. triangles: (n, 3). regions: source triangles of each light, rows of source_corners (t, 3, 3),
     m. A light that moves gets vertices of its own after the others; vertices without any light are left out. report:
-    called with the share of the work that is done, may raise.
+    called with the share of the work that is done, may raise. allowance: how much own light is none. tree: of
+    source_corners, where there is one.
     """
     corners = positions[triangles]
     own = own_shares(corners, regions, source_corners, ROUGH_POINTS)
-    offenders = _worst(own, _areas_of(regions, source_corners))
+    offenders = allowance.exceeded(own, region_areas(regions, source_corners))
     moved = np.zeros(len(corners), bool)
     if not len(offenders):
         return Withdrawal(positions, triangles, moved, own)
-    tree = build_tree(source_corners)
+    tree = tree or build_tree(source_corners)
+    aim = min(allowance.each, allowance.together)
     inset = insets(corners)
     for first in range(0, len(offenders), LIGHTS_PER_BATCH):
         report(first / len(offenders))
         rows = offenders[first : first + LIGHTS_PER_BATCH]
-        part = _rows_of(regions, rows)
+        part = rows_of(regions, rows)
         # By themselves: all that follows takes as long as there are source triangles.
         alone = Rows(np.arange(len(part.values)), part.starts)
-        placed, left = _best_places(corners[rows], inset[rows], alone, source_corners[part.values], tree)
+        placed, left = _best_places(corners[rows], inset[rows], alone, source_corners[part.values], tree, aim)
         changed = left < own[rows]
         corners[rows[changed]], own[rows[changed]], moved[rows[changed]] = placed[changed], left[changed], True
     apart = triangles.copy()
@@ -88,51 +90,20 @@ def withdraw(
     return Withdrawal(every[used], apart.reshape(-1, 3), moved, own)
 
 
-def _worst(own: Float64, areas: Float64) -> Int64:
-    """The lights with more than ALLOWED own light, most of it first, without those that matter to no picture."""
-    total = float(areas.sum())
-    received = own * areas / (total if total > 0.0 else 1.0)
-    order = np.argsort(-received, kind="stable")
-    # Of each with those that follow.
-    left = np.cumsum(received[order][::-1])[::-1]
-    return order[(own[order] > ALLOWED) & (left > NEGLIGIBLE)]
-
-
-def own_shares(corners: Float64, regions: Rows, source_corners: Float64, points: int) -> Float64:
-    """(n,) mean irradiance of each region from its own light over the radiosity of the region, at `points` points."""
-    samples = sample_regions(source_corners, regions, np.full(len(corners), points))
-    light = np.repeat(np.arange(len(corners)), np.diff(samples.offsets))
-    factors = _seen_factors(samples.positions, samples.normals.astype(np.float64), corners, light)
-    shares = sum_by(light, factors * samples.weights, len(corners))
-    return shares * _areas_of(regions, source_corners) / np.maximum(_areas(corners), np.finfo(float).tiny)
-
-
-def _seen_factors(points: Float64, normals: Float64, corners: Float64, light: Int64) -> Float64:
-    """(p,) form factors of each point and the light beside it; most are nought and found to be by two planes."""
-    vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    in_front = np.einsum("ij,ij->i", vector[light], points - corners[light, 0]) > 0
-    rows = np.flatnonzero(in_front)
-    heights = np.einsum("ikj,ij->ik", corners[light[rows]] - points[rows, None], normals[rows])
-    rows = rows[heights.max(axis=1, initial=-1.0) > 0]
-    factors = np.zeros(len(points))
-    factors[rows] = paired_form_factor(points[rows], normals[rows], corners[light[rows]])
-    return factors
-
-
 def _best_places(
-    corners: Float64, inset: Float64, regions: Rows, source_corners: Float64, tree: TriangleTree
+    corners: Float64, inset: Float64, regions: Rows, source_corners: Float64, tree: TriangleTree, aim: float
 ) -> tuple[Float64, Float64]:
-    """(corners, own share) of the nearest place of each light with little own light, else of the one with the least.
+    """(corners, own share) of the nearest place of each light with own light up to `aim`, else of that with the least.
 
     Places that are not inside of the body are not taken.
     """
     places, effort = _places(corners, inset, regions, source_corners)
     count, each = places.shape[:2]
     flat = places.reshape(-1, 3, 3)
-    repeated = _rows_of(regions, np.repeat(np.arange(count), each))
+    repeated = rows_of(regions, np.repeat(np.arange(count), each))
     own = own_shares(flat, repeated, source_corners, FINE_POINTS).reshape(count, each)
     # Of places with little own light the one with the least effort.
-    score = np.where(own <= ALLOWED, effort * ALLOWED, own + ALLOWED * (1.0 + effort))
+    score = np.where(own <= aim, effort * aim, own + aim * (1.0 + effort))
     span = _spans(corners, regions, source_corners)
     # A light that is not inside as it stands may shrink there, too.
     shallow = np.arange(each) < len(SHRINKS) * (1 + len(DEPTHS))
@@ -158,7 +129,7 @@ def _places(corners: Float64, inset: Float64, regions: Rows, source_corners: Flo
 
     The light as it stands first; the places of a size and a middle follow each other by depth.
     """
-    regions_area = _areas_of(regions, source_corners)
+    regions_area = region_areas(regions, source_corners)
     least = np.sqrt(LEAST_AREA_SHARE * regions_area / np.maximum(_areas(corners), np.finfo(float).tiny))
     shrinks = np.maximum(np.array(SHRINKS), np.minimum(1.0, least)[:, None])
     places, steps = [], []
@@ -225,17 +196,6 @@ def _inside(corners: Float64, span: Float64, tree: TriangleTree) -> Bool:
         facing = np.einsum("ij,ij->i", unit_normals(tree.corners[met]), way[rows]) > 0
         inside[rows] = (met >= 0) & facing
     return inside
-
-
-def _rows_of(regions: Rows, chosen: Int64) -> Rows:
-    """The rows `chosen` of a ragged table, in that order."""
-    _, values = regions.expand(chosen)
-    return Rows(values, np.concatenate([[0], np.cumsum(regions.lengths[chosen])]))
-
-
-def _areas_of(regions: Rows, source_corners: Float64) -> Float64:
-    owner = np.repeat(np.arange(len(regions.lengths)), regions.lengths)
-    return sum_by(owner, _areas(source_corners)[regions.values], len(regions.lengths))
 
 
 def _areas(corners: Float64) -> Float64:
