@@ -71,7 +71,6 @@ def reduce_groups(
     report: called with the share of the work that is done before each part of a few tenths of a second, may raise.
     """
     group = _in_blocks(positions, triangles, group)
-    report(0.0)
     apart, origin = _cut_between_groups(triangles, group, len(positions))
     points = positions[origin]
     kept = np.ones(len(triangles), bool)
