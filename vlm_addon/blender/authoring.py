@@ -165,11 +165,16 @@ def from_lit_scene(context: Any, settings: BakeSettings) -> Callable[[Progress],
     return _work_on_scene(context, found, settings)
 
 
+def from_snapshot(context: Any, snapshot: SceneSnapshot, settings: BakeSettings) -> Callable[[Progress], Made]:
+    """Work that makes one light mesh of all that the scene shows, which is `snapshot`."""
+    sources = tuple(thing.name for thing in rendered_objects(context) if has_geometry(thing))
+    return _work(snapshot, NAME, sources, settings)
+
+
 def _work_on_scene(context: Any, found: Extraction, settings: BakeSettings) -> Callable[[Progress], Made]:
     snapshot, existing = found.snapshot, found.light_mesh
     if existing is None:
-        sources = tuple(thing.name for thing in rendered_objects(context) if has_geometry(thing))
-        return _work(snapshot, NAME, sources, settings)
+        return from_snapshot(context, snapshot, settings)
     history = light_history(context.scene, found)
     return lambda progress: Made(
         bake(snapshot, existing, None, progress, history=history), snapshot.name, origins=found.origins

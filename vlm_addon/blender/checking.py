@@ -31,17 +31,23 @@ class Checked:
 
 def check(context: Any) -> Callable[[Progress], Checked]:
     """Work that looks for what is wrong with the light meshes and the light grid of the scene, and what extraction had
-    to approximate: first what has become of the sources, which is often why the rest is wrong."""
+    to approximate."""
     found = extract_edited(context)
-    causes = changed_sources(context.scene, surface_hashes(found.snapshot.meshes))
-    settings = scene_grid_settings(context.scene)
-    budget = over_budget(context.scene, len(found.light_mesh or ()))
-    history = light_history(context.scene, found)
-    notes = (*budget, *animation.left_behind(context.scene), *found.snapshot.findings)
+    look = findings_of(context.scene, found)
+    return lambda progress: Checked(found.snapshot.name, (*look(progress), *found.snapshot.findings), found.origins)
 
-    def work(progress: Progress) -> Checked:
+
+def findings_of(scene: Any, found: Extraction) -> Callable[[Progress], tuple[Finding, ...]]:
+    """Work that looks for what is wrong with the lights that were `found` in `scene`, with whatever values they have:
+    first what has become of the sources, which is often why the rest is wrong."""
+    causes = changed_sources(scene, surface_hashes(found.snapshot.meshes))
+    settings = scene_grid_settings(scene)
+    notes = (*over_budget(scene, len(found.light_mesh or ())), *animation.left_behind(scene))
+    history = light_history(scene, found)
+
+    def work(progress: Progress) -> tuple[Finding, ...]:
         findings = check_lights(found.snapshot, found.light_mesh, settings, progress, history)
-        return Checked(found.snapshot.name, (*causes, *findings, *notes), found.origins)
+        return (*causes, *findings, *notes)
 
     return work
 

@@ -18,11 +18,11 @@ from .interface.properties import ensure_scene_settings
 from .scene_file import OpenedScene, open_scene, require_writable
 
 
-def opened_scene(arguments: Namespace) -> tuple[OpenedScene, Extraction]:
-    """The scene that a command was given, and what is in it. Raises InvalidInput."""
+def opened_scene(arguments: Namespace, broken_values: bool = False) -> tuple[OpenedScene, Extraction]:
+    """The scene that a command was given, and what is in it; broken_values: as for `extract`. Raises InvalidInput."""
     ensure_scene_settings()
     opened = open_scene(arguments.scene, arguments.frame, arguments.scene_name, arguments.view_layer, arguments.camera)
-    return opened, extract(ExtractOptions(viewport_levels=arguments.viewport_levels))
+    return opened, extract(ExtractOptions(viewport_levels=arguments.viewport_levels), broken_values=broken_values)
 
 
 def require_apart(scene: Path, outputs: Sequence[Path]) -> None:

@@ -9,18 +9,17 @@ from dataclasses import asdict
 import bpy
 
 from ..bake import Bake, BakeSettings, bake
-from ..core.bake_key import surface_hashes
 from ..core.errors import InvalidInput
 from ..core.light_grid_export import SUFFIX as FIXED_SIZE_SUFFIX
 from ..core.light_grid_export import save_fixed_size_lists
 from ..core.light_grid_file import save_light_grid
 from ..core.scene import Finding, SceneSnapshot
 from ..core.settings import from_mapping
-from ..light_grid_bake import GridBake, bake_light_grid, check_lights
+from ..light_grid_bake import GridBake, bake_light_grid
 from ..terminal import TerminalProgress
-from .baking.bake_state import set_made_from
+from .authoring import from_snapshot, write
 from .baking.visibility_bake import bake_visibility, require_room_for_visibility
-from .checking import over_budget
+from .checking import findings_of
 from .command_support import opened_scene, print_findings, require_apart, scene_report, write_json
 from .extraction.extract import ExtractOptions
 from .extraction.light_mesh_io import Extraction, extract_light_mesh
@@ -29,7 +28,6 @@ from .light_grid_options import keep_options, scene_grid_settings
 from .light_history import light_history
 from .names import NAME, SOURCES_PROPERTY
 from .scene_file import save_blend
-from .write_back import write_light_mesh
 
 
 def bake_command(arguments: Namespace) -> None:
@@ -46,13 +44,7 @@ def bake_command(arguments: Namespace) -> None:
     drawn = _drawn_by_hand()
     anew = not drawn and (found.light_mesh is None or settings is not None)
     _require_visible_light_meshes(found)
-    made = bake(found.snapshot, None if anew else found.light_mesh, settings if anew else None, TerminalProgress())
-    if anew:
-        for other in light_mesh_objects(bpy.context.scene):
-            if other.name != NAME:
-                bpy.data.objects.remove(other)
-        written = write_light_mesh(made.light_mesh, NAME, [mesh.name for mesh in found.snapshot.meshes])
-        set_made_from(written, surface_hashes(found.snapshot.meshes))
+    made = _made_anew(found.snapshot, settings or BakeSettings()) if anew else _kept(found)
     findings = made.findings
     if settings is not None and drawn:
         problem = f"the scene has light meshes drawn by hand ({', '.join(drawn)}), so --triangles made no other"
@@ -80,6 +72,22 @@ def bake_command(arguments: Namespace) -> None:
         about_grid["visibility"] = visibility.report()
     about_findings = {"findings": [str(finding) for finding in findings]}
     write_json(arguments.json, scene_report(opened) | made.report() | about_grid | about_findings)
+
+
+def _made_anew(snapshot: SceneSnapshot, settings: BakeSettings) -> Bake:
+    """One new light mesh in place of all that the scene has, written as Create from Scene writes it."""
+    made = from_snapshot(bpy.context, snapshot, settings)(TerminalProgress())
+    for other in light_mesh_objects(bpy.context.scene):
+        if other.name != NAME:
+            bpy.data.objects.remove(other)
+    write(made)
+    return made.bake
+
+
+def _kept(found: Extraction) -> Bake:
+    """The lights that the scene has, checked."""
+    history = light_history(bpy.context.scene, found)
+    return bake(found.snapshot, found.light_mesh, None, TerminalProgress(), history=history)
 
 
 def _grid(snapshot: SceneSnapshot, arguments: Namespace) -> GridBake | None:
@@ -132,17 +140,13 @@ def _bake_summary(made: Bake) -> str:
 def check_command(arguments: Namespace) -> int:
     """`check`: prints what is wrong with the light mesh; returns how many findings there are.
 
-    What extraction approximates is printed and reported as notes, which do not count.
+    It looks for what the sidebar's Check does. What extraction approximates is printed and reported as notes, which do
+    not count.
     """
     require_apart(arguments.scene, [arguments.json] if arguments.json is not None else [])
-    opened, found = opened_scene(arguments)
-    settings = scene_grid_settings(bpy.context.scene)
-    history = light_history(bpy.context.scene, found)
+    opened, found = opened_scene(arguments, broken_values=True)
     light_count = len(found.light_mesh) if found.light_mesh is not None else 0
-    findings = (
-        *check_lights(found.snapshot, found.light_mesh, settings, TerminalProgress(), history),
-        *over_budget(bpy.context.scene, light_count),
-    )
+    findings = findings_of(bpy.context.scene, found)(TerminalProgress())
     for finding in findings:
         print(f"finding: {finding}")
     for note in found.snapshot.findings:
