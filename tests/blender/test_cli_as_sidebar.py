@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line makes and checks light meshes as the sidebar does."""
+"""The command line makes and checks light meshes as the sidebar does, and renders pictures of the same size."""
 
 import bpy
 import numpy as np
@@ -7,14 +7,17 @@ import pytest
 
 from vlm_addon.bake import BakeSettings
 from vlm_addon.blender import authoring, checking
+from vlm_addon.blender.engine import picture_size
 from vlm_addon.blender.interface.properties import ensure_scene_settings
 from vlm_addon.blender.light_faces import read_faces, write_faces
 from vlm_addon.blender.light_meshes import light_meshes, source_names, sources
 from vlm_addon.blender.names import COLOR_ATTRIBUTE, MARK_ATTRIBUTE, TAG_ATTRIBUTE
+from vlm_addon.blender.render_commands import with_scene_settings
 from vlm_addon.blender.scene_file import open_scene
 from vlm_addon.cli import main
 from vlm_addon.core.progress import silent
 from vlm_addon.core.tag_pairs import FIRST_AUTOMATIC
+from vlm_addon.render.frame_types import RenderSettings
 
 pytestmark = pytest.mark.usefixtures("_empty_file")
 
@@ -70,3 +73,13 @@ def test_a_negative_color_is_the_finding_that_the_sidebar_lists(make_cube, tmp_p
     assert main(["check", path]) == 3
     told = [line.removeprefix("finding: ") for line in capsys.readouterr().out.splitlines() if "finding: " in line]
     assert told == listed
+
+
+@pytest.mark.parametrize(("percentage", "size"), [(1, (12, 7)), (70, (896, 504)), (100, (1280, 720))])
+def test_a_picture_has_the_size_of_f12(percentage, size):
+    ensure_scene_settings()
+    render = bpy.context.scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 1280, 720, percentage
+    assert picture_size(bpy.context.scene) == size
+    chosen = with_scene_settings(RenderSettings(1, 1, "vlm"), None)
+    assert (chosen.width, chosen.height) == size

@@ -16,6 +16,7 @@ from vlm_addon.blender.light_faces import face_count, read_faces, select_faces, 
 from vlm_addon.blender.write_back import write_light_mesh
 from vlm_addon.core.errors import InvalidInput
 from vlm_addon.core.light_mesh import empty_light_mesh
+from vlm_addon.core.tag_pairs import FIRST_AUTOMATIC
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -191,6 +192,34 @@ def test_filling_again_adds_to_the_light_mesh_of_the_object(make_cube):
     fill(bpy.context)
     assert [thing.name for thing in bpy.data.objects if "vlm_schema" in thing] == ["VLM Drawn"]
     assert len(bpy.data.objects["VLM Drawn"].data.polygons) == 2
+
+
+def test_ids_that_pairing_gave_stay_with_the_lights_that_were_paired(make_cube):
+    cube = make_cube()
+    cube["vlm_tag"] = FIRST_AUTOMATIC + 1
+    write_faces(cube, "vlm_tag", np.array([FIRST_AUTOMATIC, 4, 0, 0, 0, 0], np.int32))
+    choose_faces(cube, [0, 1, 2], "OBJECT")
+    fill(bpy.context)
+    assert tags(bpy.data.objects["VLM Drawn"]) == [0, 4, 0]
+
+
+@pytest.mark.parametrize(("change", "told"), [("scale", "scale is zero"), ("version", "with the version")])
+def test_a_light_mesh_of_the_object_that_can_take_no_lights_is_refused(make_cube, change, told):
+    cube = make_cube()
+    choose_faces(cube, [0], "OBJECT")
+    fill(bpy.context)
+    made = bpy.data.objects["VLM Drawn"]
+    if change == "scale":
+        made.scale.z = 0.0
+    else:
+        made["vlm_schema"] = 99
+    bpy.context.view_layer.update()
+    made.select_set(False)
+    bpy.context.view_layer.objects.active = cube
+    choose_faces(cube, [1], "OBJECT")
+    with pytest.raises(InvalidInput, match=told):
+        fill(bpy.context)
+    assert face_count(made) == 1
 
 
 def test_no_face_selected_is_refused(make_cube):

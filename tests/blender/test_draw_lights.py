@@ -130,6 +130,11 @@ def test_an_id_that_pairing_gave_a_face_stays_with_the_lights_that_were_paired(r
     assert read_faces(draw(SQUARE), "vlm_tag").tolist() == [7]
 
 
+def test_an_id_that_pairing_gave_an_object_stays_with_the_lights_that_were_paired(red_plane):
+    red_plane["vlm_tag"] = FIRST_AUTOMATIC
+    assert read_faces(draw(SQUARE), "vlm_tag").tolist() == [0]
+
+
 @pytest.mark.parametrize("hollow", [True, False])
 def test_on_curved_surfaces_no_light_stands_in_front(hollow):
     bpy.ops.mesh.primitive_uv_sphere_add(radius=2.0, segments=48, ring_count=24)

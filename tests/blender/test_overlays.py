@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.overlays import overlay_drawing, overlays
 from vlm_addon.blender.overlays.overlay_drawing import OverlayDrawing
 from vlm_addon.blender.overlays.overlay_shapes import (
@@ -23,6 +24,8 @@ from vlm_addon.blender.overlays.overlay_shapes import (
     world_faces,
 )
 from vlm_addon.core.display_colors import hdr_colors, tag_colors
+from vlm_addon.core.grid_samples import grid_view
+from vlm_addon.core.light_grid import RANGE, GridSettings, LightGrid
 
 HANDLERS = ("depsgraph_update_post", "undo_post", "redo_post", "load_post")
 
@@ -180,6 +183,22 @@ def test_another_file_keeps_the_handlers_in_step(registered):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     shown = bpy.context.window_manager.vlm_overlay.show
     assert (overlays._depsgraph_changed in bpy.app.handlers.depsgraph_update_post) == shown
+
+
+def test_a_grid_that_is_shown_again_is_drawn_anew(make_lights, registered, monkeypatch):
+    """Also where its cells have the address that those before had: here they all have one."""
+    make_lights()
+    context, drawing, drawn = bpy.context, OverlayDrawing(), []
+    monkeypatch.setattr(overlay_drawing, "id", lambda _: 1, raising=False)
+    monkeypatch.setattr(overlay_drawing, "cell_shapes", lambda *rest: drawn.append(rest) or [])
+    lights = extract().light_mesh
+    bounds = lights.vertices.min(axis=0), lights.vertices.max(axis=0)
+    view = grid_view(LightGrid.bake(lights, bounds, GridSettings(mode=RANGE, grid=4)), lights, bounds)
+    for _ in range(2):
+        drawing.set_grid(context.scene, view)
+        for _ in range(2):
+            drawing._grid_part(context.scene, SimpleNamespace(grid_place="CURSOR", opacity=0.7))
+    assert len(drawn) == 2
 
 
 def test_only_what_changed_is_made_anew(make_lights, make_plane):

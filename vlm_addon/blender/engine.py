@@ -72,7 +72,7 @@ class VLM_RenderEngine(bpy.types.RenderEngine):  # noqa: N801 (Blender's naming 
             self.report({"WARNING"}, str(finding))
         if scene.render.film_transparent:
             self.report({"WARNING"}, "Film > Transparent is not supported: the world is shown and alpha is 1")
-        width, height = _picture_size(scene)
+        width, height = picture_size(scene)
         settings = RenderSettings(
             width=width,
             height=height,
@@ -120,7 +120,8 @@ def _fill(passes: Any, frame: Frame, rows: slice, columns: slice) -> None:
         passes[title].rect.foreach_set(pixels.ravel())
 
 
-def _picture_size(scene: Any) -> tuple[int, int]:
+def picture_size(scene: Any) -> tuple[int, int]:
+    """Width and height in pixels of the pictures of `scene`, rounded as Blender does."""
     render = scene.render
     return (
         max(render.resolution_x * render.resolution_percentage // 100, 1),
@@ -130,7 +131,7 @@ def _picture_size(scene: Any) -> tuple[int, int]:
 
 def _render_region(scene: Any) -> tuple[int, int, int, int]:
     """Left, bottom, right, top of the pixels that Blender asks for: all, or those inside the render border."""
-    width, height = _picture_size(scene)
+    width, height = picture_size(scene)
     render = scene.render
     if not render.use_border:
         return 0, 0, width, height

@@ -21,6 +21,7 @@ from ..render.frame_types import Frame, RenderSettings, require_in_range
 from ..render.technique import technique_by_name, technique_list
 from ..terminal import TerminalProgress, table
 from .command_support import opened_scene, print_findings, require_apart, scene_report, write_json
+from .engine import picture_size
 from .extraction.extract import require_camera, require_lights, require_surfaces
 from .extraction.light_mesh_io import Extraction
 from .image_io import LOCAL_VIEW, PNG, require_format, require_view, write_display, write_image
@@ -47,7 +48,7 @@ def render_command(arguments: Namespace) -> None:
     if arguments.buffers is not None:
         _make_folder(arguments.buffers)
     opened, found = opened_scene(arguments)
-    settings = _with_scene_settings(settings, arguments.size)
+    settings = with_scene_settings(settings, arguments.size)
     if arguments.world_lights is None:
         settings = replace(settings, world_lights=bpy.context.scene.vlm.world_lights)
     require_camera(found.snapshot)
@@ -80,7 +81,7 @@ def effects_command(arguments: Namespace) -> None:
         _asked_settings(arguments, arguments.technique)
     opened, found = opened_scene(arguments)
     technique = arguments.technique or bpy.context.scene.vlm.technique
-    settings = _with_scene_settings(_asked_settings(arguments, technique), arguments.size)
+    settings = with_scene_settings(_asked_settings(arguments, technique), arguments.size)
     require_camera(found.snapshot)
     frame = _rendered(found, replace(settings, samples=1, plan_only=True), TerminalProgress())
     decisions = frame.plan.effects
@@ -104,7 +105,7 @@ def _asked_settings(arguments: Namespace, technique: str) -> RenderSettings:
     return RenderSettings(width, height, technique, chosen, effects=effects)
 
 
-def _with_scene_settings(settings: RenderSettings, size: tuple[int, int] | None) -> RenderSettings:
+def with_scene_settings(settings: RenderSettings, size: tuple[int, int] | None) -> RenderSettings:
     """`settings` with what the current scene says of all that they do not."""
     scene = bpy.context.scene
     kept = technique_settings(scene, settings.technique)
@@ -112,7 +113,7 @@ def _with_scene_settings(settings: RenderSettings, size: tuple[int, int] | None)
     values = {**kept, **settings.technique_settings}
     chosen: Any = from_mapping(technique_type.settings, values, f"technique {settings.technique!r}")
     effects = {**effect_values(scene), **settings.effects}
-    width, height = size or _scene_size()
+    width, height = size or picture_size(scene)
     return replace(settings, width=width, height=height, technique_settings=asdict(chosen), effects=effects)
 
 
@@ -124,12 +125,6 @@ def _setting_texts(pairs: Sequence[str], option: str) -> dict[str, str]:
             raise InvalidInput(f"{option} {pair!r}", "it is not KEY=VALUE", f"write it as in {option} NAME=1")
         texts[name] = value
     return texts
-
-
-def _scene_size() -> tuple[int, int]:
-    render = bpy.context.scene.render
-    share = render.resolution_percentage / 100.0
-    return max(int(render.resolution_x * share), 1), max(int(render.resolution_y * share), 1)
 
 
 def _rendered(found: Extraction, settings: RenderSettings, progress: Progress) -> Frame:

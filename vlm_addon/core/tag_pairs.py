@@ -28,6 +28,12 @@ def is_automatic(tags: npt.ArrayLike) -> Bool:
     return np.asarray(tags) >= FIRST_AUTOMATIC
 
 
+def given_by_hand(tags: npt.ArrayLike) -> Int32:
+    """The ids that artists gave, UNTAGGED in place of those of pairing: these belong to the lights that were paired,
+    and another light of them would leave out what they do."""
+    return np.where(is_automatic(tags), UNTAGGED, np.asarray(tags)).astype(np.int32)
+
+
 def living_tags(face_tags: Int32, known: Int32) -> Int32:
     """`face_tags` without ids that pairing gave for lights that are gone: none of `known` any more."""
     dead = is_automatic(face_tags) & ~np.isin(face_tags, known)

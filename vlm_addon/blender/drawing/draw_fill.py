@@ -13,6 +13,7 @@ from ...core.errors import InvalidInput
 from ...core.mesh_topology import Rows
 from ...core.placement import insets, intrusions, place_behind
 from ...core.scene import UNTAGGED
+from ...core.tag_pairs import given_by_hand
 from ..extraction.color_space import working_to_rec709
 from ..extraction.materials import FindingList, MaterialTable
 from ..extraction.mesh_arrays import LocalMesh, place, read, read_mesh
@@ -20,7 +21,7 @@ from ..extraction.mesh_extraction import MeshExtractor
 from ..light_meshes import is_local, light_meshes_of
 from ..names import TAG_PROPERTY, is_light_mesh
 from ..stored_values import whole_number
-from .draw_lights import NewLights, find_target, light_count, write_lights
+from .draw_lights import NewLights, find_target, light_count, require_target, write_lights
 from .drawn_faces import Faces
 
 
@@ -62,7 +63,10 @@ def fill(context: Any, target: str = "") -> str:
 
 def _light_mesh_of(things: list[Any], scene: Any) -> Any | None:
     found = [each for thing in things for each in light_meshes_of(thing, scene) if is_local(each)]
-    return found[0] if found else None
+    if not found:
+        return None
+    require_target(found[0])
+    return found[0]
 
 
 def _lights_of(thing: Any, depsgraph: Any) -> NewLights | None:
@@ -92,10 +96,11 @@ def _read(thing: Any, evaluated: Any, mesh: Any, depsgraph: Any) -> NewLights | 
     deep = intrusions(points[lights], regions, source) > 0.5 * insets(points[lights])
     reflectance, emission = _averages(evaluated, local, rows, depsgraph)
     areas = 0.5 * np.linalg.norm(np.cross(source[:, 1] - source[:, 0], source[:, 2] - source[:, 0]), axis=1)
-    own = whole_number(thing, TAG_PROPERTY)
+    own = given_by_hand(whole_number(thing, TAG_PROPERTY))
     count = int(chosen.sum())
     tags = np.full(count, own, np.int32)
-    tags[owners] = np.where(local.face_tags[rows] != UNTAGGED, local.face_tags[rows], own)
+    face_tags = given_by_hand(local.face_tags[rows])
+    tags[owners] = np.where(face_tags != UNTAGGED, face_tags, own)
     return NewLights(
         faces=Faces(points, _rings(mesh, chosen, used, mirrored)),
         colors=_face_means(reflectance, areas, owners, count),

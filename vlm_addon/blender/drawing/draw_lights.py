@@ -95,10 +95,15 @@ def find_target(context: Any, name: str) -> Any | None:
         active = context.active_object
         thing = active if active is not None and active.type == "MESH" and is_light_mesh(active) else None
     if thing is not None:
-        require_editable(thing)
-        if abs(np.linalg.det(np.array(thing.matrix_world))) == 0.0:
-            raise InvalidInput(f"light mesh {thing.name!r}", "its scale is zero", "give it a scale")
+        require_target(thing)
     return thing
+
+
+def require_target(thing: Any) -> None:
+    """Raises InvalidInput for a light mesh that cannot take lights."""
+    require_editable(thing)
+    if abs(np.linalg.det(np.array(thing.matrix_world))) == 0.0:
+        raise InvalidInput(f"light mesh {thing.name!r}", "its scale is zero", "give it a scale")
 
 
 def worked_out(context: Any, faces: Faces, offset: float, thing: Any | None) -> NewLights:

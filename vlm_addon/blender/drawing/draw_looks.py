@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.scene import UNTAGGED, Float32, Float64
-from ...core.tag_pairs import is_automatic
+from ...core.tag_pairs import given_by_hand
 from ..extraction.kept_materials import forget_large, material_reader
 from ..extraction.mesh_arrays import LocalMesh, read_attribute
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY
@@ -140,7 +140,7 @@ class _Reader:
         original = bpy.data.objects.get(hit.key)
         if original is None:
             return None
-        tag = whole_number(original, TAG_PROPERTY) or self._instancer_tag(original, hit)
+        tag = int(given_by_hand(whole_number(original, TAG_PROPERTY))) or self._instancer_tag(original, hit)
         if hit.key not in self._surfaces:
             self._surfaces[hit.key] = self._own(original)
         found = _under(self._surfaces[hit.key], tag, hit, piece)
@@ -164,7 +164,7 @@ class _Reader:
             if not instance.is_instance or instance.parent is None or instance.object.original != original:
                 continue
             if np.allclose(np.array(instance.matrix_world), hit.matrix, atol=SAME_PLACE):
-                return whole_number(instance.parent.original, TAG_PROPERTY)
+                return int(given_by_hand(whole_number(instance.parent.original, TAG_PROPERTY)))
         return UNTAGGED
 
     def _own(self, original: Any) -> _Surface:
@@ -206,15 +206,11 @@ class _Reader:
 
 
 def _tag(under: _Under) -> int:
-    """Tag that an artist gave the face, else that of the object.
-
-    Ids given by pairing belong to the lights that were paired: a light with one would leave out what they do.
-    """
+    """Tag that an artist gave the face, else that which one gave the object."""
     attribute = under.surface.mesh.attributes.get(TAG_ATTRIBUTE)
     if attribute is None or attribute.domain != "FACE" or attribute.data_type != "INT":
         return under.object_tag
-    tag = int(attribute.data[under.face].value)
-    return under.object_tag if tag == UNTAGGED or is_automatic(tag) else tag
+    return int(given_by_hand(attribute.data[under.face].value)) or under.object_tag
 
 
 def _under(surface: _Surface, tag: int, hit: SurfaceHit, piece: Float64) -> _Under | None:

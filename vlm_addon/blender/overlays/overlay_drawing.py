@@ -71,6 +71,7 @@ class OverlayDrawing:
         self._surface_changes = 0
         self._grids: dict[str, GridView] = {}
         self._cells: tuple[Any, Cells] | None = None
+        self._looks = 0
 
     def begin(self) -> None:
         """Draw in all 3D views."""
@@ -128,6 +129,7 @@ class OverlayDrawing:
         key = (id(view), cells.tobytes())
         if self._cells is None or self._cells[0] != key:
             self._cells = key, look(view, cells)
+            self._looks += 1
         return self._cells[1]
 
     def _draw(self) -> None:
@@ -220,7 +222,7 @@ class OverlayDrawing:
         cells = self.cells(scene, place)
         assert cells is not None
         axis, tolerance = AXES.get(place, 0), view.grid.settings.tolerance
-        key = (id(cells), place, settings.opacity)
+        key = (self._looks, place, settings.opacity)
         return self._part(GRID, key, lambda: cell_shapes(cells, tolerance, place in AXES, axis, 0.6 * settings.opacity))
 
     def _part(self, name: str, key: Any, shapes: Callable[[], Iterable[Shape]]) -> _Part:
