@@ -15,7 +15,7 @@ import numpy as np
 from .hand_over import hand_over
 from .mesh_topology import Bool, Int64, Rows, rows_by_key
 from .own_shares import NEGLIGIBLE, Allowance, allowance_of, own_shares, region_areas
-from .placement import BodyTrees, Placement, place_behind
+from .placement import BodyTrees, Placement, RegionFacts, place_behind
 from .progress import Report, between
 from .reduce_surface import ReducedSurface
 from .regions import Regions
@@ -112,6 +112,8 @@ def _pushed(
     """Those lights behind all of their regions that shine on them too much, with what moving them calls for."""
     areas = region_areas(regions, surface.corners)
     pushing = np.zeros(len(lights.triangles), bool)
+    report(0.0)
+    facts = RegionFacts.of(lights.positions, lights.triangles, regions, surface.corners)
     for push in range(1 + PUSHES):
         placed = place_behind(
             lights.positions,
@@ -121,6 +123,7 @@ def _pushed(
             between(report, push / (1 + PUSHES), (push + 1) / (1 + PUSHES)),
             pushing,
             trees,
+            facts,
         )
         own = own_shares(placed.positions[lights.triangles], regions, surface.corners, POINTS)
         over = allowance.exceeded(own, areas)

@@ -81,6 +81,24 @@ class BodyTrees:
         return build_tree(self.source_corners)
 
 
+@dataclass(frozen=True)
+class RegionFacts:
+    """What regions are to lights before any push. facing: their triangles that face as their light does. towards:
+    (n, 3) where these face. surface_points: (v, 3) m, the point of them that is about the nearest to each vertex."""
+
+    facing: Rows
+    towards: Float64
+    surface_points: Float64
+
+    @staticmethod
+    def of(positions: Float64, triangles: Int64, regions: Rows, source_corners: Float64) -> RegionFacts:
+        """Of what `place_behind` is given."""
+        facing = _facing_regions(positions[triangles], regions, source_corners)
+        around = vertex_faces(triangles, len(positions))
+        points = _surface_points(positions, facing, source_corners, around)
+        return RegionFacts(facing, _mean_normals(facing, source_corners), points)
+
+
 def place_behind(
     positions: Float64,
     triangles: Int64,
@@ -89,24 +107,24 @@ def place_behind(
     report: Callable[[float], None] = lambda share: None,
     pushing: Bool | None = None,
     trees: BodyTrees | None = None,
+    facts: RegionFacts | None = None,
 ) -> Placement:
     """`positions` moved so that the plane of each light lies behind its region as far as the body is thick enough.
 
     positions: (v, 3). triangles: (n, 3). regions: source triangles of each light. source_corners: (t, 3, 3), m. No
     triangle turns over or loses more than 1 - LEAST_AREA_SHARE of its area. report: called with the share of the work
     that is done, may raise. pushing: (n,) lights that are to stand behind their regions, by default all; the
-    others only by their insets. trees: of positions[triangles] and source_corners, if known.
+    others only by their insets. trees: of positions[triangles] and source_corners, facts: of regions, if known.
     """
     if not len(triangles):
         return Placement(positions, np.zeros(0, bool), np.zeros(0))
-    facing = _facing_regions(positions[triangles], regions, source_corners)
-    towards = _mean_normals(facing, source_corners)
+    facts = facts or RegionFacts.of(positions, triangles, regions, source_corners)
+    facing, towards, surface_points = facts.facing, facts.towards, facts.surface_points
     inset = insets(positions[triangles])
     around = vertex_faces(triangles, len(positions))
     trees = trees or BodyTrees(positions[triangles], source_corners)
     pushing = np.ones(len(triangles), bool) if pushing is None else pushing
     pressing = only_rows(facing, pushing)
-    surface_points = _surface_points(positions, facing, source_corners, around)
     longest = LARGEST_STEP * _smallest_around(np.sqrt(normals_and_areas(positions[triangles])[1]), around)
     # What moves by the insets alone is not looked at: no body that shows is that thin.
     least = INSETS_UNSEEN * _largest_around(inset, around)
