@@ -347,6 +347,16 @@ def test_what_is_animated_is_up_to_date_in_every_frame(room):
     assert changes() == ()
 
 
+def test_objects_whose_names_hold_slashes_are_told_apart(make_cube):
+    make_cube("Wall/Left"), make_cube("Wall/Right")
+    select("Wall/Left", "Wall/Right")
+    authoring.write(authoring.from_selection(bpy.context, FEW)(silent))
+    assert changes() == ()
+    move(bpy.data.objects["Wall/Right"])
+    bpy.context.view_layer.update()
+    assert changes() == ("VLM Wall/Left: 'Wall/Right' changed",)
+
+
 def test_comparing_marks_nothing_as_changed(room):
     bake()
     changes()

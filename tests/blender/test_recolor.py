@@ -200,9 +200,11 @@ def test_picking_a_point_averages_over_the_radius_or_the_size_of_the_lights(
     assert colors(lights)[0, 0] == pytest.approx(expected, abs=0.02)
 
 
-def test_picking_on_an_instance_sees_the_instance(make_plane, striped, lights_below, scene):
+@pytest.mark.parametrize("name", ["plane", "red/white"])
+def test_picking_on_an_instance_sees_the_instance(make_plane, striped, lights_below, scene, name):
     group = bpy.data.collections.new("group")
     plane = make_plane(size=4.0, material=striped, collection=group)
+    plane.name = name
     instance = bpy.data.objects.new("instance", None)
     instance.instance_type, instance.instance_collection = "COLLECTION", group
     instance.location.x = 100.0

@@ -23,6 +23,7 @@ from .light_geometry import LightFaces, light_faces_in_world
 from .light_meshes import require_editable, unchanged_light_mesh
 from .names import COLOR_ATTRIBUTE, EMISSION_ATTRIBUTE, LOCK_ATTRIBUTE
 from .source_colors import SourceColors, SurfaceColors
+from .tagging.source_faces import owners_of
 
 POINT, OBJECT = "POINT", "OBJECT"
 PLACES = (
@@ -167,7 +168,7 @@ def _surface_at(place: Place) -> SourceColors:
         if alone.distance(place.location) <= ON_SURFACE * np.linalg.norm(high - low):
             return alone
     everything = extract_scene(ExtractOptions(viewport_levels=True))
-    meshes = tuple(mesh for mesh in everything.meshes if place.source in mesh.name.split("/"))
+    meshes = tuple(mesh for mesh in everything.meshes if place.source in owners_of(mesh.name))
     if not meshes:
         raise InvalidInput(
             f"object {place.source!r}", "the view shows no surface of it", "name an object that is shown"

@@ -18,7 +18,7 @@ from .scene import Mesh
 
 DIGITS = 16
 """Of a hash: 64 bits tell a scene's surfaces apart."""
-NOT_MADE_FROM = {"name", "corner_normals", "corner_uvs", "corner_colors", "material_indices", "tag_ids"}
+NOT_MADE_FROM = {"name", "owner", "corner_normals", "corner_uvs", "corner_colors", "material_indices", "tag_ids"}
 """Fields of Mesh that lights are not made from: what looks mean is in `reflectance` and `emission`, and tags say which
 lights a surface leaves out when there are lights."""
 LIGHT_ALONE = {"colour", "emission", "strength", "samples"}
@@ -55,7 +55,8 @@ def surface_hashes(meshes: Iterable[Mesh]) -> dict[str, str]:
     parts: dict[str, list[str]] = {}
     for mesh in meshes:
         left_out = NOT_MADE_FROM | {"positions"} if mesh.dynamic else NOT_MADE_FROM
-        parts.setdefault(mesh.name.split("/")[0], []).append(_hash(mesh, left_out))
+        owner = mesh.owner or mesh.name.split("/")[0]
+        parts.setdefault(owner, []).append(_hash(mesh, left_out))
     return {name: found[0] if len(found) == 1 else _short(found) for name, found in parts.items()}
 
 

@@ -84,7 +84,8 @@ class Mesh:
     SceneSnapshot.materials. tag_ids: (t,) int32, UNTAGGED where none. reflectance: (t, 3) float32, diffuse
     reflectance averaged over the triangle. emission: (t, 3) float32, radiant exitance in W/m², averaged likewise.
     detail: (t,) float32, about how many times as many virtual lights as elsewhere a surface of this shape gets, 0 for
-    none; (0,) where nothing is asked for.
+    none; (0,) where nothing is asked for. owner: name of the object of the scene that shows it, itself or as an
+    instance; "": the part of `name` before the first "/".
     """
 
     name: str
@@ -99,6 +100,7 @@ class Mesh:
     emission: Float32
     dynamic: bool = False
     detail: Float32 = field(default_factory=lambda: np.zeros(0, np.float32), repr=False)
+    owner: str = ""
 
     def subset(self, chosen: npt.NDArray[np.bool_]) -> Mesh:
         """The mesh with the triangles of `chosen`, (t,) bool, and all vertices."""

@@ -109,6 +109,7 @@ class MeshExtractor:
         look = self._look(local, self._uses(instance.object), name)
         return Mesh(
             name=name,
+            owner=str((instance.parent if instance.is_instance and instance.parent else instance.object).name),
             positions=positions,
             triangles=triangles,
             corner_normals=normals,
