@@ -47,6 +47,8 @@ from window_steps import (
 PIE_PIXELS = 120
 FIELD_PIXELS = 20
 """By which the mouse goes to the left, into the middle of the field."""
+OK_PIXELS = 27
+"""From the field down to the button OK."""
 PRESETS_ICON = (172, -11)
 PRESETS_HEIGHT = 200
 SECONDS_TO_UNDO = 10.0
@@ -193,9 +195,8 @@ def name_in_dialog(button):
     yield from type_text("Cube", field)
     yield from look("dialog_filled")
     press("RET", field)
-    yield SECONDS_FOR_REDRAW
-    press("RET", field)
     yield from look("dialog_done")
+    yield from slow_click((field[0], field[1] - OK_PIXELS))
 
 
 def left_out_by_name():
