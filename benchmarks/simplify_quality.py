@@ -28,10 +28,12 @@ from benchmarks.simplify_rivals import RIVALS, Soup, joined, nearest_lights
 from benchmarks.support import MODELS, SAMPLE_BLENDS, open_sample, quiet
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.scene_file import open_scene
+from vlm_addon.core.hide_lights import hide_lights
 from vlm_addon.core.light_mesh import VirtualLightMesh, empty_light_mesh
-from vlm_addon.core.mesh_topology import Int64, rows_by_key, sum_by
+from vlm_addon.core.mesh_topology import Int64, sum_by
 from vlm_addon.core.metrics import relative_rmse
-from vlm_addon.core.placement import place_behind
+from vlm_addon.core.reduce_surface import ReducedSurface
+from vlm_addon.core.regions import Regions
 from vlm_addon.core.scene import Float64, SceneSnapshot
 from vlm_addon.core.simplify import STRENGTH_LIMIT, SimplifySettings, create_light_mesh
 from vlm_addon.core.source_surface import SourceSurface, join_surface
@@ -138,23 +140,38 @@ def compared(case: Case, budgets: Sequence[int], ways: Sequence[str]) -> Iterato
                 points, triangles = RIVALS[way](soup, budget)
                 seconds = time.process_time() - start
                 region = nearest_lights(case.surface, (points, triangles))
-                rows = rows_by_key(region, len(triangles))
-                moved = place_behind(points, triangles, rows, case.surface.corners).positions
-                placed = _as_lights(moved, triangles)
-                yield judged(case, budget, way, placed, region, (points, triangles), seconds)
+                placed, own_region = _hidden(case.surface, (points, triangles), region)
+                yield judged(case, budget, way, placed, own_region, (region, (points, triangles)), seconds)
+
+
+def _hidden(surface: SourceSurface, soup: Soup, region: Int64) -> tuple[VirtualLightMesh, Int64]:
+    """Another's lights placed as ours are, and their regions; it knows of no borders between materials."""
+    one_group = replace(surface, group=np.zeros_like(surface.group))
+    none = np.zeros(len(soup[1]), np.int64)
+    lights = ReducedSurface(*soup, none, np.zeros(0, np.int64), False)
+    hidden = hide_lights(one_group, lights, Regions(region, np.zeros(len(region), bool)), False)
+    return _as_lights(hidden.positions, hidden.triangles), hidden.light
 
 
 def judged(
-    case: Case, budget: int, way: str, lights: VirtualLightMesh, region: Int64, plain: Soup | None, seconds: float
+    case: Case,
+    budget: int,
+    way: str,
+    lights: VirtualLightMesh,
+    region: Int64,
+    plain: tuple[Int64, Soup] | None,
+    seconds: float,
 ) -> Row:
-    """Errors of lights with the mean radiosity of their regions."""
+    """Errors of lights with the mean radiosity of their regions; plain: regions and lights that nothing is made of."""
     mean, area = region_means(case, region, len(lights))
     strength = np.clip(area / lights.areas, 0.0, STRENGTH_LIMIT)
     radiosity = strength[:, None] * mean
     sent = case.surface.areas @ case.radiosity
     radiosity *= sent / (lights.areas @ radiosity)
     found = case.bounce.irradiance(lights, radiosity)
-    plain_found = case.bounce.irradiance(_as_lights(*plain), mean) if plain is not None else None
+    plain_found = None
+    if plain is not None:
+        plain_found = case.bounce.irradiance(_as_lights(*plain[1]), region_means(case, plain[0], len(plain[1][1]))[0])
     return Row(
         case.name,
         budget,
