@@ -7,9 +7,8 @@ import pytest
 
 from vlm_addon.blender.extraction.light_mesh_io import extract
 from vlm_addon.blender.light_faces import read_faces, select_faces, write_faces
-from vlm_addon.blender.light_meshes import new_tags
 from vlm_addon.blender.tag_separation import separate
-from vlm_addon.blender.tagging import light_tags, tag_pairing
+from vlm_addon.blender.tagging import light_tags, links, tag_pairing
 from vlm_addon.blender.tagging.light_tags import assign_tag, clear_tag, tag_problem, unused_tag
 from vlm_addon.blender.tagging.source_faces import NO_FACE, read_source_faces
 from vlm_addon.blender.tagging.stored_links import read_links, write_links
@@ -284,7 +283,40 @@ def test_ids_of_lights_that_are_gone_are_forgotten_and_those_of_artists_stay(mak
 def test_ids_by_hand_are_below_those_of_pairing(make_grid, make_lights):
     make_grid(sides=2)
     run(tag_pairing.pair, make_lights(((0, 0, -0.1), 1.0)))
-    assert unused_tag() == new_tags(1)[0] == 1
+    assert unused_tag() == 1
+
+
+def test_ids_by_hand_that_are_used_up_do_not_run_over_into_those_of_pairing(make_cube, make_lights):
+    make_cube("last")["vlm_tag"] = FIRST_AUTOMATIC - 3
+    assert unused_tag(2) == FIRST_AUTOMATIC - 2
+    with pytest.raises(InvalidInput, match="that can be given by hand"):
+        unused_tag(3)
+    lights, cube = make_lights(((0, 0, 0), 1)), make_cube("cube")
+    bpy.data.objects["last"]["vlm_tag"] = FIRST_AUTOMATIC - 1
+    select(lights, cube)
+    with pytest.raises(InvalidInput, match="that can be given by hand"):
+        links.link_receivers(CONTEXT, [cube])
+    assert "vlm_tag" not in cube
+
+
+def test_copies_of_what_an_artist_gave_an_id_get_ids_as_artists_give_them(make_grid, make_lights, scene):
+    grid = make_grid(sides=1)
+    grid["vlm_tag"] = 12
+    lights = make_lights(((0, 0, -0.1), 1.0), sources=["grid"])
+    write_faces(lights, "vlm_tag", np.array([12]))
+    make_grid("hidden", sides=1)["vlm_tag"] = 40
+    bpy.data.objects["hidden"].hide_render = True
+    copies = []
+    for thing in (grid, lights):
+        copy = thing.copy()
+        copy.data = thing.data.copy()
+        copy.location.x += 10.0
+        scene.collection.objects.link(copy)
+        copies.append(copy)
+    copies[1]["vlm_sources"] = ""
+    assert run(separate, lights, copies[1])[0].pairs == 1
+    assert (grid["vlm_tag"], tags(lights)) == (12, [12])
+    assert (copies[0]["vlm_tag"], tags(copies[1])) == (41, [41])
 
 
 def test_an_id_given_by_hand_goes_to_the_lights(make_grid, make_lights):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import zlib
 from collections import Counter
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Sequence
 from typing import Any
 
 import bpy
@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from ..core.errors import InvalidInput
 from ..core.scene import UNTAGGED
-from ..core.tag_pairs import is_automatic
 from .light_faces import face_count, read_faces
 from .names import (
     ID_PROPERTY,
@@ -34,7 +33,6 @@ from .names import (
 )
 from .source_copies import PLACE_SIZE, Place, place_of, right_copy, stored_places
 from .stored_values import text, whole_number, whole_numbers
-from .tagging.stored_links import read_links
 
 NO_ID = 0
 LARGEST_ID = 2**31 - 1
@@ -235,16 +233,3 @@ def tags_of(thing: Any) -> npt.NDArray[np.int32]:
     if thing.type == "MESH":
         found += np.unique(read_faces(thing, TAG_ATTRIBUTE)).tolist()
     return np.array(sorted({tag for tag in found if tag != UNTAGGED}), np.int32)
-
-
-def new_tags(count: int, things: Iterable[Any] | None = None) -> npt.NDArray[np.int32]:
-    """(count,) int32: tag ids that none of `things` (all objects of the file by default) carries or has links of,
-    ascending: a link whose lights or surfaces are gone is not to hold for others.
-
-    They are ids as artists give them, not those of pairing (core/tag_pairs.py).
-    """
-    looked_at = list(bpy.data.objects if things is None else things)
-    used = [tags_of(thing) for thing in looked_at]
-    used += [read_links(thing).ravel() for thing in looked_at if is_light_mesh(thing)]
-    largest = max((int(tags.max()) for each in used if len(tags := each[~is_automatic(each)])), default=0)
-    return np.arange(max(largest, 0) + 1, max(largest, 0) + 1 + count, dtype=np.int32)

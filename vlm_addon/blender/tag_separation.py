@@ -10,9 +10,9 @@ import numpy as np
 from ..core.light_links import make_links
 from ..core.progress import Progress
 from ..core.scene import UNTAGGED, Int32
-from ..core.tag_pairs import TagUse, related, unpaired
+from ..core.tag_pairs import TagUse, is_automatic, related, unpaired
 from ..core.tags import separated_tags
-from .tagging.light_tags import counted
+from .tagging.light_tags import counted, require_given
 from .tagging.region_pairs import RegionPairs, region_pairs
 from .tagging.source_faces import NO_FACE
 from .tagging.tag_pairing import Retagged, Tagging, Written
@@ -36,8 +36,9 @@ def separate(tagging: Tagging, progress: Progress) -> Retagged:
         [groups[use] for use in faces],
         tagging.unused,
     )
-    new_light = dict(zip(lights, found.light_tags.tolist(), strict=True))
-    new_face = dict(zip(faces, found.face_tags.tolist(), strict=True))
+    given = _as_given([*lights, *faces], [*found.light_tags.tolist(), *found.face_tags.tolist()], tagging)
+    new_light = {use: given.get(tag, tag) for use, tag in zip(lights, found.light_tags.tolist(), strict=True)}
+    new_face = {use: given.get(tag, tag) for use, tag in zip(faces, found.face_tags.tolist(), strict=True)}
     light_mesh_of = tagging.light_mesh_of()
     light_tags = [
         new_light.get(TagUse(tag, _lights_owner(owner)), tag)
@@ -54,6 +55,16 @@ def separate(tagging: Tagging, progress: Progress) -> Retagged:
     )
     changed = np.array(light_tags, np.int32), np.array(face_tags, np.int32)
     return Retagged(tagging, *changed, links, paired, len(found.repaired))
+
+
+def _as_given(uses: list[TagUse], tags: list[int], tagging: Tagging) -> dict[int, int]:
+    """Ids as artists give them in place of those new ones of `tags` that take the place of such ids: creation forgets
+    the others. Raises InvalidInput where there are not so many."""
+    new = dict.fromkeys(
+        tag for use, tag in zip(uses, tags, strict=True) if tag >= tagging.unused and not is_automatic(use.tag)
+    )
+    require_given(tagging.unused_given + len(new) - 1)
+    return {tag: tagging.unused_given + number for number, tag in enumerate(new)}
 
 
 def _order(use: TagUse) -> tuple[int, int]:

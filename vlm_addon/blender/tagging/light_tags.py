@@ -60,14 +60,25 @@ def tag_problem(context: Any) -> str | None:
     return f"{linked.name} is linked from another file: make it local first" if linked is not None else None
 
 
-def unused_tag() -> int:
-    """The least id above all that artists have given to lights, surfaces and links. Raises InvalidInput without any."""
+def unused_tag(count: int = 1) -> int:
+    """The first of `count` ids above all that artists have given to lights, surfaces and links: a link whose lights or
+    surfaces are gone is not to hold for others. Raises InvalidInput where there are not so many."""
+    first = first_unused_tag()
+    require_given(first + count - 1)
+    return first
+
+
+def first_unused_tag() -> int:
+    """The same, whether or not there is such an id: `require_given` says."""
     used = used_tags()
-    tag = next_tag(used[~is_automatic(used)])
-    if is_automatic(tag):
-        problem = f"the largest tag id that can be given by hand, {FIRST_AUTOMATIC - 1}, is in use"
+    return next_tag(used[~is_automatic(used)])
+
+
+def require_given(largest: int) -> None:
+    """Raises InvalidInput where new ids as artists give them, up to `largest`, run over into those of pairing."""
+    if is_automatic(largest):
+        problem = f"the largest tag id that can be given by hand, {FIRST_AUTOMATIC - 1}, is in use or soon would be"
         raise InvalidInput("tags", problem, "give a smaller one to what carries it (Assign Tag)")
-    return tag
 
 
 def unused_automatic_tag() -> int:

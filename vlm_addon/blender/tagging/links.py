@@ -22,10 +22,10 @@ from ...core.tag_pairs import is_automatic
 from ..authoring import lights as lights_text
 from ..interface.availability import has_geometry
 from ..light_faces import chosen_faces, read_faces, write_faces
-from ..light_meshes import chosen_light_meshes, is_local, light_meshes, new_tags, require_editable, tags_of
+from ..light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, tags_of
 from ..names import TAG_ATTRIBUTE, TAG_PROPERTY, is_light_mesh
 from ..stored_values import set_value, whole_number
-from .light_tags import tags_of_lights
+from .light_tags import tags_of_lights, unused_tag
 from .shown_things import Shown, require_alone, shown_things
 from .stored_links import read_links, read_paired_links, write_links
 from .unused_ids import forget_unused
@@ -83,7 +83,9 @@ def link_receivers(context: Any, receivers: Sequence[Any]) -> Linked:
         if not is_local(thing):
             remedy = f"make it local, or give it a tag in its own file (custom property {TAG_PROPERTY})"
             raise InvalidInput(f"object {thing.name!r}", "it is linked from another file and has no tag", remedy)
-    ids = new_tags(len(untagged) + len(bare)).tolist()
+    count = len(untagged) + len(bare)
+    first = unused_tag(count) if count else UNTAGGED
+    ids = list(range(first, first + count))
     light_ids = {each.mesh: number for each, number in zip(untagged, ids, strict=False)}
     receiver_ids = dict(zip((thing.name_full for thing in bare), ids[len(untagged) :], strict=True))
     receiver_tags = np.unique(

@@ -27,7 +27,7 @@ from ..light_faces import read_faces
 from ..light_geometry import light_faces_in_world
 from ..light_meshes import chosen_light_meshes, is_local, light_meshes, require_editable, sources, unchanged_light_mesh
 from ..names import TAG_ATTRIBUTE
-from .light_tags import counted, unused_automatic_tag, write_tags
+from .light_tags import counted, first_unused_tag, unused_automatic_tag, write_tags
 from .other_lights import OtherLights, StoredLinks, distributed, read_others
 from .region_pairs import RegionPairs, SourceLights, region_pairs
 from .source_faces import NO_FACE, SourceFaces, read_source_faces
@@ -44,7 +44,7 @@ class Tagging:
 
     names: of the light meshes. lights: the lights of each. light_tags: of all their faces, numbered through. links: of
     each; paired: those of them that pairing has made. source: the visible surface. others: the other light meshes of
-    the file. unused: from here on no id is used in the file.
+    the file. unused: from here on no id is used in the file; unused_given: none that artists give.
     """
 
     names: tuple[str, ...]
@@ -55,6 +55,7 @@ class Tagging:
     source: SourceFaces
     others: OtherLights
     unused: int
+    unused_given: int
 
     @property
     def all_links(self) -> Int32:
@@ -133,6 +134,7 @@ def read_tagging(context: Any, things: Sequence[Any], objects: Sequence[Any] = (
         source=source,
         others=read_others(context.scene, things),
         unused=unused_automatic_tag(),
+        unused_given=first_unused_tag(),
     )
 
 
