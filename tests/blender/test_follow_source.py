@@ -435,14 +435,15 @@ def test_a_light_mesh_that_is_made_anew_follows_again_with_its_new_shape(bent_sh
     assert np.abs(np.sort(place(lights), axis=0) - np.sort(again.bake.light_mesh.vertices, axis=0)).max() > 0.05
 
 
-def test_made_anew_from_other_objects_it_follows_nothing_and_says_so(bent_sheet, make_cube, scene):
+def test_made_anew_from_more_objects_it_follows_nothing_and_says_so(bent_sheet, make_cube, scene):
     ensure_scene_settings()
     cube = make_cube()
     lights = lights_behind(bent_sheet)
     follow_sources(lights, bpy.context)
     lights.name = "VLM Cube"
     bpy.ops.object.select_all(action="DESELECT")
-    cube.select_set(True)
+    for thing in (bent_sheet, cube):
+        thing.select_set(True)
     bpy.context.view_layer.objects.active = cube
     said = authoring.write(authoring.from_selection(bpy.context, BakeSettings(target_triangles=30))(silent))
     assert "follows nothing any more" in said
