@@ -180,6 +180,17 @@ def test_a_grid_whose_bake_was_interrupted_does_not_count(room, tmp_path):
     assert state() == bake_state.CURRENT
 
 
+@pytest.mark.parametrize("missing", [bake_store.GRID_SUFFIX, bake_store.KEY_SUFFIX])
+def test_what_an_interrupted_bake_left_can_be_cleared(room, tmp_path, missing):
+    save(tmp_path / "room.blend")
+    path = bake()
+    path.with_suffix(missing).unlink()
+    assert bake_grid.clear_problem(bpy.context) is None
+    bake_grid.clear(bpy.context)
+    assert not path.parent.exists()
+    assert bake_grid.clear_problem(bpy.context) is not None
+
+
 def test_a_broken_key_is_told(room, tmp_path):
     save(tmp_path / "room.blend")
     bake().with_suffix(".json").write_text("{")

@@ -50,7 +50,7 @@ def clear_problem(context: Any) -> str | None:
     """Why there is no baked data to remove, or None."""
     if context.scene.library is not None:
         return f"The scene is linked from {context.scene.library.filepath}: open it, the baked data is its own"
-    if not bake_store.grid_path(context.scene).is_file():
+    if not (bake_store.has_grid(context.scene) or bake_store.is_interrupted(context.scene)):
         return "No light grid is baked for this scene: Bake Light Grid makes one"
     return None
 
