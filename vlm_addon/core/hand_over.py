@@ -11,17 +11,22 @@ from __future__ import annotations
 import numpy as np
 
 from .corner_arrays import middles
-from .mesh_topology import Int64, Rows, normals_and_areas, rows_by_key, sum_by
+from .mesh_topology import Bool, Int64, Rows, normals_and_areas, rows_by_key, sum_by
 from .own_shares import Allowance, seen_factors
+from .parallel import side_by_side, slices
+from .progress import Report, between
 from .scene import Float64
 
-# Lights nearby among which a triangle chooses.
-NEARBY = 12
+# Lights around the one that gives, and of these the lights nearby among which a triangle chooses.
+AROUND, NEARBY = 48, 12
+# Of what its own light gives, what another may shine on a triangle that it takes.
+FAINT = 0.1
 # Of what each light may have, what is left to a light that hands over.
 AIM = 0.5
 # The light of a hollow whose sides are handed over is stronger on what is left: again, so many times.
 TURNS = 3
 PAIRS_PER_BATCH = 1 << 20
+GIVEN_PER_BATCH = 1 << 12
 
 
 def hand_over(
@@ -32,37 +37,49 @@ def hand_over(
     light_group: Int64,
     allowance: Allowance,
     least: float = 0.0,
+    suspected: Bool | None = None,
+    report: Report = lambda share: None,
 ) -> Int64:
     """(t,) the light of each source triangle, of `light` (t,) or, where that shines on it too much, of another.
 
     corners: (n, 3, 3) lights, m. source_corners: (t, 3, 3), m. group (t,), light_group (n,): only lights of its group
     take a triangle, if its own is. least: share of a light's radiosity that a triangle receives from it before it may
-    go. Every light keeps a triangle.
+    go. Every light keeps a triangle. suspected: (n,) lights that may hand over, by default all. report: called with
+    the share of the work that is done, may raise.
     """
     light = light.copy()
     normals, areas = normals_and_areas(source_corners)
-    held = np.flatnonzero((light >= 0) & (areas > 0))
+    held = (light >= 0) & (areas > 0)
     light_areas = np.maximum(normals_and_areas(corners)[1], np.finfo(float).tiny)
     places = middles(source_corners)
     aim = AIM * min(allowance.each, allowance.together)
-    for _ in range(TURNS):
-        of_held = light[held]
-        factors = seen_factors(places[held], normals[held], corners, of_held)
-        region = sum_by(of_held, areas[held], len(corners))
+    asked = np.ones(len(corners), bool) if suspected is None else suspected.copy()
+    # Of each triangle and its light, once it has been asked for.
+    factors = np.full(len(light), np.nan)
+    for turn in range(TURNS):
+        told = between(report, turn / TURNS, (turn + 1) / TURNS)
+        told(0.0)
+        rows = np.flatnonzero(held & asked[light])
+        fresh = rows[np.isnan(factors[rows])]
+        factors[fresh] = seen_factors(places[fresh], normals[fresh], corners, light[fresh], between(told, 0.0, 0.7))
+        region = sum_by(light[held], areas[held], len(corners))
         strength = region / light_areas
-        sums = sum_by(of_held, factors * areas[held], len(corners)) / np.maximum(region, np.finfo(float).tiny)
+        owner = light[rows]
+        received = sum_by(owner, factors[rows] * areas[rows], len(corners)) / np.maximum(region, np.finfo(float).tiny)
         over = np.zeros(len(corners), bool)
-        over[allowance.exceeded(sums * strength, region)] = True
-        shone = factors * strength[of_held]
-        many = over[of_held] & (shone > least)
-        given = _worst(held[many], of_held[many], (shone * areas[held])[many], aim * region)
+        over[allowance.exceeded(received * strength, region)] = True
+        shone = factors[rows] * strength[owner]
+        many = over[owner] & (shone > least)
+        given = _worst(rows[many], owner[many], (shone * areas[rows])[many], aim * region)
         given = given[~_last_of_each(given, light, areas)]
         if not len(given):
             break
-        chosen = _others(given, light, places, normals, corners, strength, group, light_group)
-        if (chosen == light[given]).all():
+        chosen = _others(given, light, places, normals, corners, strength, group, light_group, between(told, 0.7, 1.0))
+        given, chosen = given[chosen != light[given]], chosen[chosen != light[given]]
+        if not len(given):
             break
-        light[given] = chosen
+        light[given], factors[given] = chosen, np.nan
+        asked[chosen] = True
     return light
 
 
@@ -99,30 +116,46 @@ def _others(
     strength: Float64,
     group: Int64,
     light_group: Int64,
+    report: Report,
 ) -> Int64:
     """(g,) the light nearby that shines least on each triangle, its own where none shines less."""
     facing, light_areas = normals_and_areas(corners)
     middle = middles(corners)
-    nearby = min(NEARBY, len(corners))
-    chosen = light[given].copy()
-    step = max(1, PAIRS_PER_BATCH // len(corners))
-    for first in range(0, len(given), step):
-        rows = given[first : first + step]
-        way = middle[None] - places[rows][:, None]
-        far = (way * way).sum(axis=2) + light_areas * (1.0 - normals[rows] @ facing.T)
-        apart = (group[rows][:, None] != light_group) & (group[rows] == light_group[light[rows]])[:, None]
+    around, giver = _around(light[given], middle)
+    nearby = min(NEARBY, around.shape[1])
+
+    def chosen(batch: slice) -> Int64:
+        rows, asked = given[batch], around[giver[batch]]
+        way = middle[asked] - places[rows][:, None]
+        turned = 1.0 - np.einsum("ij,ikj->ik", normals[rows], facing[asked])
+        far = np.einsum("ikj,ikj->ik", way, way) + light_areas[asked] * turned
+        apart = (group[rows] == light_group[light[rows]])[:, None] & (group[rows][:, None] != light_group[asked])
         far[apart] = np.inf
         near = np.argpartition(far, nearby - 1, axis=1)[:, :nearby]
+        far, near = np.take_along_axis(far, near, 1), np.take_along_axis(asked, near, 1)
+        # Its own light first, which is none of the others.
+        far = np.concatenate([np.full((len(rows), 1), np.inf), far], axis=1)
         near = np.concatenate([light[rows][:, None], near], axis=1)
-        far = np.take_along_axis(far, near, 1)
         flat = np.repeat(rows, near.shape[1])
         shone = seen_factors(places[flat], normals[flat], corners, near.ravel()) * strength[near.ravel()]
+        shone = shone.reshape(far.shape)
         # The nearest of those that shine on it hardly more than the least.
-        shone = np.where(np.isfinite(far), shone.reshape(far.shape), np.inf)
         alike = np.einsum("ij,ikj->ik", normals[rows], facing[near]) > 0
-        good = (shone <= 0.1 * shone[:, :1]) & alike
-        score = np.where(good & np.isfinite(far), far, np.inf)
+        score = np.where((shone <= FAINT * shone[:, :1]) & alike, far, np.inf)
         best = score.argmin(axis=1)
-        found = np.isfinite(score[np.arange(len(rows)), best])
-        chosen[first : first + step] = np.where(found, near[np.arange(len(rows)), best], light[rows])
-    return chosen
+        each = np.arange(len(rows))
+        return np.where(np.isfinite(score[each, best]), near[each, best], light[rows])
+
+    return np.concatenate(list(side_by_side(chosen, slices(len(given), GIVEN_PER_BATCH), report)))
+
+
+def _around(givers: Int64, middle: Float64) -> tuple[Int64, Int64]:
+    """((k, AROUND) lights around each of the k lights that give, (g,) the row of each given triangle's light)."""
+    lights, row = np.unique(givers, return_inverse=True)
+    count = min(AROUND, len(middle))
+    found = []
+    for batch in slices(len(lights), max(1, PAIRS_PER_BATCH // len(middle))):
+        way = middle[None] - middle[lights[batch]][:, None]
+        far = np.einsum("ikj,ikj->ik", way, way)
+        found.append(np.argpartition(far, count - 1, axis=1)[:, :count])
+    return np.concatenate(found), row

@@ -14,7 +14,7 @@ import numpy as np
 
 from .hand_over import hand_over
 from .mesh_topology import Bool, Int64, Rows, rows_by_key
-from .own_shares import NEGLIGIBLE, Allowance, allowance_of, own_shares, region_areas
+from .own_shares import NEGLIGIBLE, Allowance, RegionLight, allowance_of, region_areas
 from .placement import BodyTrees, Placement, RegionFacts, place_behind
 from .progress import Report, between
 from .reduce_surface import ReducedSurface
@@ -27,8 +27,8 @@ from .withdrawal import WHOLE, withdraw
 POINTS = 32
 # Pushing some lights moves their neighbours, which may then need it, too.
 PUSHES = 3
-# Share of the time that pushing takes.
-PUSH_TIME = 0.75
+# Shares of the time after which lights have been looked at (twice), have handed over, are pushed and have withdrawn.
+LOOK_TIME, HAND_TIME, PUSH_TIME, LAST_TIME = 0.05, 0.25, 0.75, 0.9
 
 
 @dataclass(frozen=True)
@@ -57,30 +57,46 @@ def hide_lights(
     done, may raise.
     """
     trees = BodyTrees(lights.positions[lights.triangles], surface.corners)
-    pushed = between(report, 0.0, PUSH_TIME)
     if whole_regions:
-        own, allowance, light = _rows(regions.light, regions.adopted, lights), WHOLE, regions.light
-        placed = place_behind(lights.positions, lights.triangles, own, surface.corners, pushed, trees=trees)
-    else:
-        filled = rows_by_key(regions.light, len(lights.triangles))
-        allowance = allowance_of(lights.positions[lights.triangles], filled, surface.corners)
-        corners = lights.positions[lights.triangles]
-        light = _handed_over(surface, lights, corners, regions.light, allowance, allowance.each)
-        own = _rows(light, regions.adopted, lights)
-        placed = _pushed(surface, lights, own, allowance, trees, pushed)
-        allowance = replace(allowance, negligible=NEGLIGIBLE)
+        return _whole(surface, lights, regions, trees, report)
+    corners = lights.positions[lights.triangles]
+    filled = rows_by_key(regions.light, len(lights.triangles))
+    allowance = allowance_of(corners, filled, surface.corners, surface.areas)
+    report(LOOK_TIME)
+    measure = RegionLight(filled, surface.corners, POINTS, surface.areas)
+    own = measure.shares(corners, between(report, LOOK_TIME, 2 * LOOK_TIME))
+    offenders = allowance.exceeded(own, measure.areas)
+    giving = _Giving(surface, lights, allowance, offenders)
+    light = giving.handed_over(corners, regions.light, allowance.each, between(report, 2 * LOOK_TIME, HAND_TIME))
+    owned = _rows(light, regions.adopted, lights)
+    placed, own = _pushed(surface, lights, owned, allowance, trees, between(report, HAND_TIME, PUSH_TIME))
+    lenient = replace(allowance, negligible=NEGLIGIBLE)
     last = withdraw(
         placed.positions,
         lights.triangles,
-        own,
+        owned,
         surface.corners,
-        between(report, PUSH_TIME, 1.0),
-        allowance,
+        between(report, PUSH_TIME, LAST_TIME),
+        lenient,
         trees.source,
+        own,
     )
-    if not whole_regions:
-        light = _handed_over(surface, lights, last.positions[last.triangles], light, allowance, 0.0)
+    owned_areas = region_areas(owned, surface.corners, surface.areas)
+    giving = _Giving(surface, lights, lenient, lenient.exceeded(last.own, owned_areas))
+    placed_corners = last.positions[last.triangles]
+    light = giving.handed_over(placed_corners, light, 0.0, between(report, LAST_TIME, 1.0))
     return HiddenLights(last.positions, last.triangles, light, placed.limited, placed.depth)
+
+
+def _whole(
+    surface: SourceSurface, lights: ReducedSurface, regions: Regions, trees: BodyTrees, report: Report
+) -> HiddenLights:
+    """All lights behind all of their regions, and those withdrawn that shine on these nevertheless."""
+    owned, pushed = _rows(regions.light, regions.adopted, lights), between(report, 0.0, PUSH_TIME)
+    placed = place_behind(lights.positions, lights.triangles, owned, surface.corners, pushed, trees=trees)
+    left = between(report, PUSH_TIME, 1.0)
+    last = withdraw(placed.positions, lights.triangles, owned, surface.corners, left, WHOLE, trees.source)
+    return HiddenLights(last.positions, last.triangles, regions.light, placed.limited, placed.depth)
 
 
 def _rows(light: Int64, adopted: Bool, lights: ReducedSurface) -> Rows:
@@ -89,16 +105,22 @@ def _rows(light: Int64, adopted: Bool, lights: ReducedSurface) -> Rows:
     return rows_by_key(light[rows], len(lights.triangles), rows)
 
 
-def _handed_over(
-    surface: SourceSurface,
-    lights: ReducedSurface,
-    corners: Float64,
-    light: Int64,
-    allowance: Allowance,
-    least: float,
-) -> Int64:
-    group = surface.group
-    return hand_over(light, corners, surface.corners, group, group[lights.source_triangle], allowance, least)
+@dataclass(frozen=True)
+class _Giving:
+    """Lights that hand over what they shine on too much. offenders: rows of those that may."""
+
+    surface: SourceSurface
+    lights: ReducedSurface
+    allowance: Allowance
+    offenders: Int64
+
+    def handed_over(self, corners: Float64, light: Int64, least: float, report: Report) -> Int64:
+        """(t,) the light of each source triangle, of `light` or of another. corners: (n, 3, 3) of the lights, m."""
+        suspected = np.zeros(len(corners), bool)
+        suspected[self.offenders] = True
+        group = self.surface.group
+        groups = group, group[self.lights.source_triangle]
+        return hand_over(light, corners, self.surface.corners, *groups, self.allowance, least, suspected, report)
 
 
 def _pushed(
@@ -108,26 +130,30 @@ def _pushed(
     allowance: Allowance,
     trees: BodyTrees,
     report: Report,
-) -> Placement:
-    """Those lights behind all of their regions that shine on them too much, with what moving them calls for."""
-    areas = region_areas(regions, surface.corners)
-    pushing = np.zeros(len(lights.triangles), bool)
+) -> tuple[Placement, Float64]:
+    """(those lights behind all of their regions that shine on them too much, with what moving them calls for, what
+    then is their own light)."""
+    measure = RegionLight(regions, surface.corners, POINTS, surface.areas)
     report(0.0)
+    pushing = np.zeros(len(lights.triangles), bool)
+    pushing[allowance.exceeded(measure.shares(lights.positions[lights.triangles]), measure.areas)] = True
+    report(0.05)
     facts = RegionFacts.of(lights.positions, lights.triangles, regions, surface.corners)
-    for push in range(1 + PUSHES):
+    for push in range(PUSHES):
+        told = between(report, 0.1 + 0.9 * push / PUSHES, 0.1 + 0.9 * (push + 1) / PUSHES)
         placed = place_behind(
             lights.positions,
             lights.triangles,
             regions,
             surface.corners,
-            between(report, push / (1 + PUSHES), (push + 1) / (1 + PUSHES)),
+            between(told, 0.0, 0.8),
             pushing,
             trees,
             facts,
         )
-        own = own_shares(placed.positions[lights.triangles], regions, surface.corners, POINTS)
-        over = allowance.exceeded(own, areas)
+        own = measure.shares(placed.positions[lights.triangles], between(told, 0.8, 1.0))
+        over = allowance.exceeded(own, measure.areas)
         if pushing[over].all():
             break
         pushing[over] = True
-    return placed
+    return placed, own

@@ -56,7 +56,7 @@ PAIRS_PER_BATCH = 1 << 15
 @dataclass(frozen=True)
 class Placement:
     """positions: (v, 3) float64, m. limited: (n,) bool, lights that the thickness kept from moving far enough.
-    depth: (n,) m, how far each light still stands in front of its region."""
+    depth: (n,) m, how far each light that was pushed still stands in front of its region."""
 
     positions: Float64
     limited: Bool
@@ -152,7 +152,7 @@ def place_behind(
             stopped |= hit
         looked_at[fresh] = moved[fresh]
         moved = _without_flips(positions, moved, triangles, towards)
-    depth = intrusions((positions + moved)[triangles], facing, source_corners)
+    depth = intrusions((positions + moved)[triangles], pressing, source_corners)
     limited = stopped[triangles].any(axis=1) & (depth > inset) & pushing
     return Placement(positions + moved, limited, np.maximum(depth, 0.0))
 

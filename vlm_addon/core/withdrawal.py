@@ -57,16 +57,17 @@ def withdraw(
     report: Callable[[float], None] = lambda share: None,
     allowance: Allowance = WHOLE,
     tree: TriangleTree | None = None,
+    own: Float64 | None = None,
 ) -> Withdrawal:
     """The lights, those with own light moved to where they give less, as far as there is such a place.
 
     positions: (v, 3), m. triangles: (n, 3). regions: source triangles of each light, rows of source_corners (t, 3, 3),
     m. A light that moves gets vertices of its own after the others; vertices without any light are left out. report:
     called with the share of the work that is done, may raise. allowance: how much own light is none. tree: of
-    source_corners, where there is one.
+    source_corners, own: (n,) of the lights as of own_shares, where they are known.
     """
     corners = positions[triangles]
-    own = own_shares(corners, regions, source_corners, ROUGH_POINTS)
+    own = own_shares(corners, regions, source_corners, ROUGH_POINTS) if own is None else own.copy()
     offenders = allowance.exceeded(own, region_areas(regions, source_corners))
     moved = np.zeros(len(corners), bool)
     if not len(offenders):
