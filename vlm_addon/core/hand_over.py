@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .corner_arrays import middles
-from .mesh_topology import Bool, Int64, Rows, normals_and_areas, rows_by_key, sum_by
+from .mesh_topology import Int64, Rows, normals_and_areas, rows_by_key, sum_by
 from .own_shares import Allowance, seen_factors
 from .parallel import side_by_side, slices
 from .progress import Report, between
@@ -25,6 +25,8 @@ FAINT = 0.1
 AIM = 0.5
 # The light of a hollow whose sides are handed over is stronger on what is left: again, so many times.
 TURNS = 3
+# Of what a light may have, own light measured at few points from which on it looks at all of its region.
+DOUBT = 0.5
 PAIRS_PER_BATCH = 1 << 20
 GIVEN_PER_BATCH = 1 << 12
 
@@ -37,15 +39,15 @@ def hand_over(
     light_group: Int64,
     allowance: Allowance,
     least: float = 0.0,
-    suspected: Bool | None = None,
+    own: Float64 | None = None,
     report: Report = lambda share: None,
 ) -> Int64:
     """(t,) the light of each source triangle, of `light` (t,) or, where that shines on it too much, of another.
 
     corners: (n, 3, 3) lights, m. source_corners: (t, 3, 3), m. group (t,), light_group (n,): only lights of its group
     take a triangle, if its own is. least: share of a light's radiosity that a triangle receives from it before it may
-    go. Every light keeps a triangle. suspected: (n,) lights that may hand over, by default all. report: called with
-    the share of the work that is done, may raise.
+    go. Every light keeps a triangle. own: (n,) as of own_shares: lights that are far from too much by it are taken at
+    their word. report: called with the share of the work that is done, may raise.
     """
     light = light.copy()
     normals, areas = normals_and_areas(source_corners)
@@ -53,7 +55,12 @@ def hand_over(
     light_areas = np.maximum(normals_and_areas(corners)[1], np.finfo(float).tiny)
     places = middles(source_corners)
     aim = AIM * min(allowance.each, allowance.together)
-    asked = np.ones(len(corners), bool) if suspected is None else suspected.copy()
+    asked = np.ones(len(corners), bool)
+    word = np.zeros(len(corners)) if own is None else own
+    if own is not None:
+        region = sum_by(light[held], areas[held], len(corners))
+        asked[:] = False
+        asked[allowance.scaled(DOUBT).exceeded(own, region)] = True
     # Of each triangle and its light, once it has been asked for.
     factors = np.full(len(light), np.nan)
     for turn in range(TURNS):
@@ -67,7 +74,7 @@ def hand_over(
         owner = light[rows]
         received = sum_by(owner, factors[rows] * areas[rows], len(corners)) / np.maximum(region, np.finfo(float).tiny)
         over = np.zeros(len(corners), bool)
-        over[allowance.exceeded(received * strength, region)] = True
+        over[allowance.exceeded(np.where(asked, received * strength, word), region)] = True
         shone = factors[rows] * strength[owner]
         many = over[owner] & (shone > least)
         given = _worst(rows[many], owner[many], (shone * areas[rows])[many], aim * region)

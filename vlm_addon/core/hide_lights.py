@@ -14,7 +14,7 @@ import numpy as np
 
 from .hand_over import hand_over
 from .mesh_topology import Bool, Int64, Rows, rows_by_key
-from .own_shares import NEGLIGIBLE, Allowance, RegionLight, allowance_of, region_areas
+from .own_shares import NEGLIGIBLE, Allowance, RegionLight, allowance_of
 from .placement import BodyTrees, Placement, RegionFacts, place_behind
 from .progress import Report, between
 from .reduce_surface import ReducedSurface
@@ -65,8 +65,7 @@ def hide_lights(
     report(LOOK_TIME)
     measure = RegionLight(filled, surface.corners, POINTS, surface.areas)
     own = measure.shares(corners, between(report, LOOK_TIME, 2 * LOOK_TIME))
-    offenders = allowance.exceeded(own, measure.areas)
-    giving = _Giving(surface, lights, allowance, offenders)
+    giving = _Giving(surface, lights, allowance, own)
     light = giving.handed_over(corners, regions.light, allowance.each, between(report, 2 * LOOK_TIME, HAND_TIME))
     owned = _rows(light, regions.adopted, lights)
     placed, own = _pushed(surface, lights, owned, allowance, trees, between(report, HAND_TIME, PUSH_TIME))
@@ -81,8 +80,7 @@ def hide_lights(
         trees.source,
         own,
     )
-    owned_areas = region_areas(owned, surface.corners, surface.areas)
-    giving = _Giving(surface, lights, lenient, lenient.exceeded(last.own, owned_areas))
+    giving = _Giving(surface, lights, lenient, last.own)
     placed_corners = last.positions[last.triangles]
     light = giving.handed_over(placed_corners, light, 0.0, between(report, LAST_TIME, 1.0))
     return HiddenLights(last.positions, last.triangles, light, placed.limited, placed.depth)
@@ -107,20 +105,18 @@ def _rows(light: Int64, adopted: Bool, lights: ReducedSurface) -> Rows:
 
 @dataclass(frozen=True)
 class _Giving:
-    """Lights that hand over what they shine on too much. offenders: rows of those that may."""
+    """Lights that hand over what they shine on too much. own: (n,) of each, as of own_shares."""
 
     surface: SourceSurface
     lights: ReducedSurface
     allowance: Allowance
-    offenders: Int64
+    own: Float64
 
     def handed_over(self, corners: Float64, light: Int64, least: float, report: Report) -> Int64:
         """(t,) the light of each source triangle, of `light` or of another. corners: (n, 3, 3) of the lights, m."""
-        suspected = np.zeros(len(corners), bool)
-        suspected[self.offenders] = True
         group = self.surface.group
         groups = group, group[self.lights.source_triangle]
-        return hand_over(light, corners, self.surface.corners, *groups, self.allowance, least, suspected, report)
+        return hand_over(light, corners, self.surface.corners, *groups, self.allowance, least, self.own, report)
 
 
 def _pushed(

@@ -44,6 +44,10 @@ class Allowance:
     together: float
     negligible: float = 0.0
 
+    def scaled(self, share: float) -> Allowance:
+        """A share of what each and all may have."""
+        return Allowance(share * self.each, share * self.together, self.negligible)
+
     def exceeded(self, own: Float64, areas: Float64) -> Int64:
         """The lights with too much own light, most of it first. own: (n,) as of own_shares. areas: (n,) m² of their
         regions."""
