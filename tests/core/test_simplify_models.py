@@ -10,6 +10,7 @@ import pytest
 
 from tests.core.surface_shapes import areas_of, mesh_of
 from vlm_addon.core.finding_kinds import IN_FRONT, THIN, TWO_SIDED
+from vlm_addon.core.light_marks import LightHistory, creation_marks
 from vlm_addon.core.scene import Mesh
 from vlm_addon.core.simplify import SimplifySettings, create_light_mesh
 from vlm_addon.core.validate import check_light_mesh
@@ -42,5 +43,6 @@ def test_count_power_shells_and_placement(name: str, target: int, whole_regions:
     assert report.shells_dropped == 0
     if whole_regions:
         assert report.share_in_front < (0.08 if target == 100 else 0.02)
-    graver = [f for f in check_light_mesh(light_mesh, [mesh]) if f.kind not in (IN_FRONT, THIN, TWO_SIDED)]
-    assert graver == []
+    history = LightHistory(creation_marks(light_mesh))
+    findings = check_light_mesh(light_mesh, [mesh], history=history)
+    assert [f for f in findings if f.kind not in (IN_FRONT, THIN, TWO_SIDED)] == []

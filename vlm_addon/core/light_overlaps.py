@@ -17,7 +17,7 @@ SIMILAR_COSINE = 0.8
 # Heights over a light that are one, in sizes (square root of the area) of the light.
 NEAR_SIZES = 1e-3
 # Share of a light's source samples that others must have, too, for its bounce to count twice.
-COVERED_SHARE = 2.0 / 3.0
+COVERED_SHARE = 0.6
 # A point among the samples of a region is at most so many spacings away from the nearest.
 NEIGHBOUR_SPACINGS = 0.5
 PAIRS_PER_BATCH = 1 << 14
