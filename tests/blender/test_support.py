@@ -11,8 +11,9 @@ import bpy
 import pytest
 
 from vlm_addon.blender import render_process
+from vlm_addon.blender.extraction.extract import extract_scene
 from vlm_addon.blender.support import diagnostics, documentation, licences, render_log
-from vlm_addon.core.errors import DeviceError
+from vlm_addon.core.errors import DeviceError, VlmError
 from vlm_addon.core.scene import SceneSnapshot
 from vlm_addon.render.frame_types import RenderSettings
 
@@ -74,6 +75,17 @@ def test_diagnostics_name_no_object_scene_or_home(make_cube, scene, log):
     text = diagnostics.diagnostics(bpy.context)
     assert not [word for word in ("Secret", "Classified", home) if word in text]
     assert "started ~/bin/python" in text
+
+
+def test_diagnostics_name_nothing_that_a_refusal_names(process, scene, make_plane):
+    scene.name = "Classified"
+    make_plane("Secret")
+    bpy.context.view_layer.update()
+    with pytest.raises(VlmError, match="Classified"):
+        process.render(extract_scene(), None, RenderSettings(8, 8, technique="direct"), lambda fraction, label: True)
+    text = diagnostics.diagnostics(bpy.context)
+    assert "InvalidInput" in text
+    assert not [word for word in ("Secret", "Classified") if word in text]
 
 
 def test_the_log_holds_what_the_renderer_said_before_it_ended(process, log, monkeypatch, tmp_path):

@@ -64,11 +64,11 @@ class KeptRenderProcess:
                     self._process = RenderProcess(_python(), search_paths(), render_log.writable_path())
                 return work(self._process)
             except DeviceError as error:
-                render_log.note(f"{type(error).__name__}: {error}")
+                render_log.note_error(error)
                 self._close()
                 raise
             except VlmError as error:
-                render_log.note(f"{type(error).__name__}: {error}")
+                render_log.note_error(error)
                 raise
 
     def close(self) -> None:

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import bpy
 
+from ...core.errors import DeviceError, VlmError
+
 NAME = "renderer.log"
 OLDER_SUFFIX = ".old"
 MOST_BYTES = 1 << 20
@@ -42,6 +44,12 @@ def note(sentence: str) -> None:
     """Add a line with the time. A log that cannot be written stops nothing."""
     with suppress(OSError), path().open("a", encoding="utf-8") as log:
         log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {sentence}\n")
+
+
+def note_error(error: VlmError) -> None:
+    """Add a line on what stopped a picture: a refusal by its kind alone, since its sentence holds names."""
+    told = f": {error}" if isinstance(error, DeviceError) else ""
+    note(f"{type(error).__name__}{told}")
 
 
 def tail(lines: int) -> list[str]:
