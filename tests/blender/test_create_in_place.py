@@ -89,3 +89,33 @@ def test_objects_that_gave_no_light_are_named(create):
     bpy.context.view_layer.objects.active = bpy.data.objects["VLM Cube"]
     told = authoring.write(create_again.again(bpy.context, BakeSettings(), False)(silent))
     assert "'Wall' is gone; 'Table' shows no surface in renders" in told
+
+
+def test_a_second_scene_keeps_its_one_light_mesh_when_an_object_is_added(make_cube):
+    ensure_scene_settings()
+    make_cube("Cube")
+    from_scene()
+    second = bpy.data.scenes.new("Second")
+    bpy.context.window.scene = second
+    for place, name in enumerate(("Wall", "Table")):
+        make_cube(name).location.x = 5.0 * place
+        for collection in list(bpy.data.objects[name].users_collection):
+            collection.objects.unlink(bpy.data.objects[name])
+        second.collection.objects.link(bpy.data.objects[name])
+        from_scene()
+    assert [thing.name for thing in light_meshes(second)] == ["VLM.001"]
+
+
+def test_a_name_that_is_too_long_for_blender_is_found_again(create):
+    source = bpy.data.objects["Cube"]
+    source.name = 63 * "n"
+    create(source.name)
+    create(source.name, "Wall")
+    create("Wall", source.name)
+    (name,) = names_of_light_meshes()
+    assert name.startswith("VLM nnn")
+
+
+def from_scene():
+    bpy.context.view_layer.update()
+    return authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))
