@@ -29,6 +29,42 @@ SITUATIONS = {
     "object edited": lambda lights, others: edit(others[0], Random(1)),
     "nothing selected": lambda lights, others: choose([]),
 }
+CHANGING = {
+    "multiply_color": {"factor": 0.5},
+    "set_strength": {"strength": 2.0},
+    "shift_hue": {"turn": 1.0},
+}
+"""Values of operators whose defaults change nothing."""
+
+
+def _forget_findings():
+    bpy.context.scene.vlm.findings.clear()
+
+
+def _share_a_tag():
+    """A copy of an object, apart from the lights of the first, leaves out the same id."""
+    cube, lights = bpy.data.objects["Cube"], bpy.data.objects["Lights"]
+    choose([cube, lights])
+    bpy.ops.vlm.pair_tags()
+    for thing in (cube, lights):
+        copy = thing.copy()
+        copy.data = thing.data.copy()
+        copy.location.x += 20.0
+        bpy.context.scene.collection.objects.link(copy)
+    choose([lights])
+
+
+def _add_a_sheet():
+    """A sheet in the room that the lights of the floor shine on from below."""
+    bpy.ops.mesh.primitive_plane_add(size=2.0)
+    bpy.context.object.name = "Sheet"
+    bpy.ops.vlm.create_from_selection(target_triangles=BUDGET)
+    bpy.data.objects["VLM Sheet"].location.z = -0.01
+    choose(meshes(True))
+
+
+BEFORE = {"check": _forget_findings, "repair_tags": _share_a_tag, "tag_thin": _add_a_sheet}
+"""What gives operators something to do that have nothing to do in the scene as it is."""
 
 
 def prepare(folder):
@@ -51,10 +87,15 @@ def prepare(folder):
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "empty.blend"))
 
 
-def open_situation(folder, situation):
-    """The scene with a light mesh, in one situation, with an undo step to come back to."""
+def open_situation(folder, situation, before=None):
+    """The scene with a light mesh, in one situation, with an undo step to come back to.
+
+    before: what is changed in the situation first.
+    """
     bpy.ops.wm.open_mainfile(filepath=str(folder / "lit.blend"))
     SITUATIONS[situation](meshes(True), meshes(False))
+    if before is not None:
+        before()
     bpy.ops.ed.undo_push(message=situation)
 
 
@@ -74,17 +115,18 @@ def known(name):
     rna = getattr(bpy.ops.vlm, name).get_rna_type()
     properties = [each for each in rna.properties if each.identifier != "rna_type" and not each.is_hidden]
     unnamed = [each.identifier for each in properties if not (each.name and each.description)]
-    return {"label": rna.name, "description": rna.description, "unexplained": unnamed}
+    undo = "UNDO" in getattr(bpy.types, rna.identifier).bl_options
+    return {"label": rna.name, "description": rna.description, "unexplained": unnamed, "undo": undo}
 
 
 def first_success(name, folder, log):
     """What the operator did in the first situation that it accepts, undone, redone and done again."""
     refusals = {}
     for situation in SITUATIONS:
-        open_situation(folder, situation)
+        open_situation(folder, situation, BEFORE.get(name))
         if name in AFTER:
             call(AFTER[name], log, {})
-        values = OWN[name](Random(2)) if name in OWN else {}
+        values = OWN[name](Random(2)) if name in OWN else CHANGING.get(name, {})
         before = content()
         result, said = call(name, log, values)
         if result != "FINISHED":
