@@ -116,6 +116,13 @@ def test_a_name_that_is_too_long_for_blender_is_found_again(create):
     assert name.startswith("VLM nnn")
 
 
+def test_lights_in_an_excluded_collection_are_said_to_light_nothing(create):
+    assert "excluded" not in create("Cube")
+    bpy.context.view_layer.layer_collection.children["Virtual Light Meshes"].exclude = True
+    told = create("Wall")
+    assert "'Virtual Light Meshes' is excluded from the view layer, so they light nothing" in told
+
+
 def from_scene():
     bpy.context.view_layer.update()
     return authoring.write(authoring.from_scene(bpy.context, BakeSettings())(silent))

@@ -232,7 +232,8 @@ def write(made: Made) -> str:
     again = animation.follow_again(written, followed, bpy.context)
     seconds = time.perf_counter() - made.started
     missing = phrases(made.gone, [name for name in made.sources if name not in made.made_from])
-    notes = "".join(f"; {note}" for note in (*missing, *(finding.problem for finding in twice)))
+    unseen = _unseen(written, scene)
+    notes = "".join(f"; {note}" for note in (*missing, *(finding.problem for finding in twice), *unseen))
     triangles = counted(made.bake.creation.source_triangles, "triangle")
     return f"Made {count} from {triangles} in {seconds:.1f} s{place}{again}{notes}"
 
@@ -244,6 +245,22 @@ def _place(made: Made, scene: Any) -> str:
         return ""
     kept = f"; {lights(made.locked)} of them locked and kept" if made.locked else ""
     return f", in place of the {faces(len(before.data.polygons))} of {before.name}{kept}"
+
+
+def _unseen(written: Any, scene: Any) -> list[str]:
+    """What to say of lights that no view layer of the scene has: they light nothing."""
+    homes = set(written.users_collection)
+    if any(_shows(layer.layer_collection, homes) for layer in scene.view_layers):
+        return []
+    name = next(iter(written.users_collection)).name
+    return [f"collection {name!r} is excluded from the view layer, so they light nothing: tick it in the Outliner"]
+
+
+def _shows(part: Any, homes: set[Any]) -> bool:
+    """Whether a part of a view layer's tree has one of these collections; its list of objects is not up to date yet."""
+    if part.exclude:
+        return False
+    return part.collection in homes or any(_shows(child, homes) for child in part.children)
 
 
 def _counted_twice(scene: Any, made: Made) -> list[Finding]:
