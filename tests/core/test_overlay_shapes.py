@@ -10,7 +10,9 @@ import pytest
 
 from tests.render.rooms import lights_from_triangles
 from vlm_addon.core.display_colors import hdr_colors, heat_colors, srgb, tag_colors
+from vlm_addon.core.form_factor import polygon_form_factor
 from vlm_addon.core.grid_samples import BOXES_PER_AXIS, cells_around, grid_view, look, slice_cells
+from vlm_addon.core.light_cut import cut_irradiance
 from vlm_addon.core.light_grid import RANGE, TOLERANCE, GridSettings, LightGrid
 from vlm_addon.core.light_mesh import VirtualLightMesh
 from vlm_addon.core.overlay_lines import NORMAL_LENGTH, box_lines, half_ball_lines, normal_lines, outlines
@@ -115,9 +117,19 @@ def test_cells_of_a_range_count_the_lights_of_their_lists() -> None:
     assert cells.errors is None
     assert len(cells.counts) == 81
     assert np.unique(cells.corners[:, :, 2], axis=0) == pytest.approx(np.array([[4 / 9, 5 / 9]]), abs=1e-6)
-    for row in (0, 40, 80):
-        found = view.grid.candidates(cells.corners[row].mean(axis=0)[None])
-        assert cells.counts[row] == len(found.light_ids)
+    centres = lights.corners.mean(axis=1)
+    radii = 2.0 * np.linalg.norm(lights.corners - centres[:, None], axis=2).max(axis=1)
+    inside = np.random.default_rng(4).uniform(0.0, 1.0, (2000, 3))
+    sides = np.cross(lights.corners[:, 1] - lights.corners[:, 0], lights.corners[:, 2] - lights.corners[:, 0])
+    least, most = np.zeros(81), np.zeros(81)
+    for row, (low, high) in enumerate(cells.corners):
+        arms = (low + inside * (high - low))[:, None] - centres
+        heights = (arms * sides).sum(axis=2)
+        least[row] = ((np.linalg.norm(arms, axis=2) < radii) & (heights > 0.0)).any(axis=0).sum()
+        most[row] = (np.linalg.norm(np.clip(centres, low, high) - centres, axis=1) < radii).sum()
+    assert (least <= cells.counts).all()
+    assert (cells.counts <= most).all()
+    assert cells.counts.sum() < 1.15 * least.sum()
     assert cells.counts.max() > cells.counts.min()
 
 
@@ -134,7 +146,17 @@ def test_boxes_with_a_tolerance_tell_the_expected_error_as_a_share_of_the_mean()
     assert len(cells.counts) == 27
     assert cells.errors is not None
     middles = cells.corners.mean(axis=1)
-    assert cells.errors * view.mean_irradiance == pytest.approx(grid.expected_error(middles))
+    light = polygon_form_factor(probes.positions, probes.normals, lights.corners) @ lights.nominal_radiosity
+    mean = light.sum(axis=1).mean()
+    sides = normals[: len(middles)]
+    tags = np.zeros(len(middles), np.int32)
+    (_, structure), *_ = grid.structures
+    of_tree = (structure.tree, structure.clusters, lights, lights.nominal_radiosity)
+    found = cut_irradiance(*of_tree, middles, sides, tags).irradiance.sum(axis=1)
+    exact = (polygon_form_factor(middles, sides, lights.corners) @ lights.nominal_radiosity).sum(axis=1)
+    off = np.abs(found - exact) / mean
+    assert np.quantile(off / cells.errors, 0.9) < 1.0
+    assert cells.errors.mean() < 10.0 * off.mean()
     assert (cells.errors > 0.0).all()
     assert (cells.errors < 0.3).all()
 
