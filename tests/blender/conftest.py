@@ -171,3 +171,22 @@ def file_state():
 def sample_folder():
     """The folder of committed sample scenes."""
     return Path(__file__).resolve().parents[2] / "sample_blends"
+
+
+@pytest.fixture
+def reads(monkeypatch):
+    """Names of the materials that are read, as they are read, while changes are listened for."""
+    from vlm_addon.blender.extraction import kept_materials
+
+    seen = []
+    table = kept_materials.MaterialTable
+    read = table._surface
+
+    def counted(self, material):
+        seen.append(material.name)
+        return read(self, material)
+
+    monkeypatch.setattr(table, "_surface", counted)
+    with ExitStack() as undo:
+        kept_materials.register(undo)
+        yield seen

@@ -10,28 +10,10 @@ import pytest
 
 from vlm_addon.blender.drawing import draw_ahead
 from vlm_addon.blender.drawing.draw_lights import draw
-from vlm_addon.blender.extraction import kept_materials
 
 SQUARE = 0.1 * np.array([(-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)])
 FROM_ABOVE = SimpleNamespace(ray=lambda pixel: (np.array([0.0, 0.0, 5.0]), np.array([0.0, 0.0, -1.0]), 10.0))
 PAST_ALL = SimpleNamespace(ray=lambda pixel: (np.array([50.0, 0.0, 5.0]), np.array([0.0, 0.0, -1.0]), 10.0))
-
-
-@pytest.fixture
-def reads(monkeypatch):
-    """Names of the materials that are read, as they are read, while changes are listened for."""
-    seen = []
-    table = kept_materials.MaterialTable
-    read = table._surface
-
-    def counted(self, material):
-        seen.append(material.name)
-        return read(self, material)
-
-    monkeypatch.setattr(table, "_surface", counted)
-    with ExitStack() as undo:
-        kept_materials.register(undo)
-        yield seen
 
 
 @pytest.fixture

@@ -1,35 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials are read once by strokes, and again when they change."""
 
-from contextlib import ExitStack
-
 import bpy
 import numpy as np
 import pytest
 
 from vlm_addon.blender.drawing.draw_lights import draw
-from vlm_addon.blender.extraction import kept_materials
 from vlm_addon.blender.light_faces import read_faces
 
 SQUARE = 0.1 * np.array([(-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)])
 BLUE = (0.1, 0.2, 0.7, 1.0)
-
-
-@pytest.fixture
-def reads(monkeypatch):
-    """Names of the materials that are read, as they are read, while changes are listened for."""
-    seen = []
-    table = kept_materials.MaterialTable
-    read = table._surface
-
-    def counted(self, material):
-        seen.append(material.name)
-        return read(self, material)
-
-    monkeypatch.setattr(table, "_surface", counted)
-    with ExitStack() as undo:
-        kept_materials.register(undo)
-        yield seen
 
 
 @pytest.fixture

@@ -299,6 +299,18 @@ def test_ids_by_hand_that_are_used_up_do_not_run_over_into_those_of_pairing(make
     assert "vlm_tag" not in cube
 
 
+def copied(scene, *things):
+    """Copies of objects with meshes of their own, beside them."""
+    copies = []
+    for thing in things:
+        copy = thing.copy()
+        copy.data = thing.data.copy()
+        copy.location.x += 10.0
+        scene.collection.objects.link(copy)
+        copies.append(copy)
+    return copies
+
+
 def test_copies_of_what_an_artist_gave_an_id_get_ids_as_artists_give_them(make_grid, make_lights, scene):
     grid = make_grid(sides=1)
     grid["vlm_tag"] = 12
@@ -306,13 +318,7 @@ def test_copies_of_what_an_artist_gave_an_id_get_ids_as_artists_give_them(make_g
     write_faces(lights, "vlm_tag", np.array([12]))
     make_grid("hidden", sides=1)["vlm_tag"] = 40
     bpy.data.objects["hidden"].hide_render = True
-    copies = []
-    for thing in (grid, lights):
-        copy = thing.copy()
-        copy.data = thing.data.copy()
-        copy.location.x += 10.0
-        scene.collection.objects.link(copy)
-        copies.append(copy)
+    copies = copied(scene, grid, lights)
     copies[1]["vlm_sources"] = ""
     assert run(separate, lights, copies[1])[0].pairs == 1
     assert (grid["vlm_tag"], tags(lights)) == (12, [12])
@@ -358,13 +364,7 @@ def test_copies_get_ids_of_their_own_with_their_links(make_grid, make_lights, sc
     run(tag_pairing.pair, lights)
     originals = tags(grid), tags(lights), read_links(lights).tolist()
     assert originals[2], "one face in two regions needs links"
-    copies = []
-    for thing in (grid, lights):
-        copy = thing.copy()
-        copy.data = thing.data.copy()
-        copy.location.x += 10.0
-        scene.collection.objects.link(copy)
-        copies.append(copy)
+    copies = copied(scene, grid, lights)
     copies[1]["vlm_sources"] = ""
     made, written = run(separate, lights, copies[1])
     assert made.pairs > 0
