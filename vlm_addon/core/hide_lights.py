@@ -80,7 +80,8 @@ def hide_lights(
         trees.source,
         own,
     )
-    giving = _Giving(surface, lights, lenient, last.own)
+    # No light is taken at its word now: few points of a region miss what a fold of it receives.
+    giving = _Giving(surface, lights, lenient, None)
     placed_corners = last.positions[last.triangles]
     light = giving.handed_over(placed_corners, light, 0.0, between(report, LAST_TIME, 1.0))
     return HiddenLights(last.positions, last.triangles, light, placed.limited, placed.depth)
@@ -105,12 +106,13 @@ def _rows(light: Int64, adopted: Bool, lights: ReducedSurface) -> Rows:
 
 @dataclass(frozen=True)
 class _Giving:
-    """Lights that hand over what they shine on too much. own: (n,) of each, as of own_shares."""
+    """Lights that hand over what they shine on too much. own: (n,) of each, as of own_shares, where it may be relied
+    on."""
 
     surface: SourceSurface
     lights: ReducedSurface
     allowance: Allowance
-    own: Float64
+    own: Float64 | None
 
     def handed_over(self, corners: Float64, light: Int64, least: float, report: Report) -> Int64:
         """(t,) the light of each source triangle, of `light` or of another. corners: (n, 3, 3) of the lights, m."""
