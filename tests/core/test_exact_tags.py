@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vlm_addon.core import exact_tags
@@ -75,6 +75,7 @@ def test_without_the_links_of_the_artist_the_pairs_and_the_ids_of_before_stay(pa
 
 
 @given(PAIRS, PAIRS, LIGHT_TAGS, FACE_TAGS, LINKS)
+@example([(0, 1)], [(0, 0), (1, 1)], LIGHTS * [0], FACES * [0], [])
 def test_pairing_again_adds_nothing_and_pairing_more_just_that(pairs, more, light_tags, face_tags, links):
     links = make_links(np.array(links, np.int64).reshape(-1, 2))
     once = made(pairs, light_tags, face_tags, links)

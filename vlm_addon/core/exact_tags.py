@@ -209,7 +209,8 @@ def _tag_faces(
     owner, tag = members.expand(np.searchsorted(share, sample))
     alone = np.bincount(owner, minlength=len(classes)) == 1
     first = tag[np.searchsorted(owner, np.arange(len(classes)))]
-    takes = (old == UNTAGGED) & alone & ~np.isin(first, links.pairs[:, 1])
+    # An id that others carry which leave out more from now on would bring that along.
+    takes = (old == UNTAGGED) & alone & ~np.isin(first, np.append(links.pairs[:, 1], old))
     keeps = (old != UNTAGGED) & (_is_all(old, class_of_row.ravel(), face_tags, elsewhere) | ~np.bool_(refine))
     fresh = ~takes & ~keeps
     new = np.where(takes, first, old)
